@@ -340,10 +340,10 @@ impl Robot {
         let options = options(clearance, tolerance);
         let found = detached(py, || self.ask(|robot| robot.motion(&edge, &options).map_err(robot_error)))?;
         Ok(match found {
-            RobotMotion::Hit { free_until, touching_at, joints, bodies, nearest } => {
+            RobotMotion::Hit { free_until, touching_at, joints, bodies, nearest, .. } => {
                 (1, free_until, touching_at, joints, bodies, nearest.distance)
             }
-            RobotMotion::Near { free_until, at, joints, bodies, nearest } => {
+            RobotMotion::Near { free_until, at, joints, bodies, nearest, .. } => {
                 (2, free_until, at, joints, bodies, nearest.distance)
             }
             _ => (0, 1.0, 1.0, Vec::new(), Default::default(), f64::INFINITY),

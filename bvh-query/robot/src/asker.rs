@@ -56,7 +56,7 @@ impl Asker {
     }
 
     /// Returns the frame of a part in the world.
-    fn frame(&self, setting: &Setting, part: usize) -> Frame {
+    pub(crate) fn frame(&self, setting: &Setting, part: usize) -> Frame {
         let part = &setting.parts[part];
         self.groups[part.group].of(&part.origin)
     }

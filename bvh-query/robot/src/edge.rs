@@ -30,7 +30,7 @@ use crate::frame::{Frame, Point, length};
 use crate::model::{Kind, Model, Value, quaternion_length};
 use crate::questions::bodies;
 use crate::robot::{Pair, Robot, Setting};
-use bvh_query::{Distance, MotionAnswer, MotionOptions, NumberError, Pose, PoseError, QueryError, RigidPath};
+use bvh_query::{Distance, MotionAnswer, MotionOptions, Pose, PoseError, RigidPath};
 use rayon::prelude::*;
 
 /// A motion of all joints: a polynomial of time, from 0 to 1, for each joint value.
@@ -109,16 +109,25 @@ fn derivative(of: &[f64]) -> Vec<f64> {
     of.iter().enumerate().skip(1).map(|(power, coefficient)| power as f64 * coefficient).collect()
 }
 
+/// The most coefficients for which Bernstein's are computed. They take the cube of this number of steps, and their binomials are
+/// exact up to here.
+const MOST_COEFFICIENTS: usize = 32;
+
 /// Returns a bound of the magnitude of a polynomial on [0, 1]: the largest of its Bernstein coefficients, of which its values are
-/// averages.
+/// averages, or the sum of its own coefficients if there are many.
 fn most(of: &[f64]) -> f64 {
+    let sum: f64 = of.iter().map(|coefficient| coefficient.abs()).sum();
+    if of.len() > MOST_COEFFICIENTS {
+        return sum * ROUNDED_UP;
+    }
     let degree = of.len().saturating_sub(1);
     let binomial =
         |n: usize, k: usize| (0..k).fold(1.0, |product, i| product * (n - i) as f64 / (i + 1) as f64);
     let bernstein = |i: usize| -> f64 {
         (0..=i.min(degree)).map(|k| binomial(i, k) / binomial(degree, k) * of.get(k).unwrap_or(&0.0)).sum()
     };
-    (0..=degree).map(|i| bernstein(i).abs()).fold(0.0, f64::max)
+    // Terms may cancel, and what is left of them is off by a part of their sum.
+    (0..=degree).map(|i| bernstein(i).abs()).fold(0.0, f64::max) + sum * (ROUNDED_UP - 1.0)
 }
 
 /// Whether a motion in joint space is free.
@@ -139,6 +148,8 @@ pub enum RobotMotion {
         bodies: [String; 2],
         /// Their distance at that time, with the points in the frames of shapes.
         nearest: Distance,
+        /// The nearest points of both at that time, in the world.
+        points: [[f64; 3]; 2],
     },
     /// Two bodies come near, but it is undecided whether they come within the clearance: their gap falls below the tolerance
     /// beyond it.
@@ -153,6 +164,8 @@ pub enum RobotMotion {
         bodies: [String; 2],
         /// Their distance at that time.
         nearest: Distance,
+        /// The nearest points of both at that time, in the world.
+        points: [[f64; 3]; 2],
     },
 }
 
@@ -184,10 +197,28 @@ impl Robot {
     /// # Errors
     /// The errors of [`Robot::is_free`], of the first motion that has one.
     pub fn are_free(&mut self, edges: &[Edge], options: &MotionOptions) -> Result<Vec<bool>, RobotError> {
+        self.many_edges(edges, |asker, setting, edge| asker.is_free(setting, edge, options))
+    }
+
+    /// Asks about many motions.
+    fn many_edges<R: Send>(
+        &mut self,
+        edges: &[Edge],
+        ask: impl Fn(&mut Asker, &Setting, &Edge) -> Result<R, RobotError> + Sync,
+    ) -> Result<Vec<R>, RobotError> {
         self.refresh();
         let (setting, asker) = (&*self.setting, &self.asker);
-        let ask = |asker: &mut Asker, edge: &Edge| asker.is_free(setting, edge, options);
+        let ask = |asker: &mut Asker, edge: &Edge| ask(asker, setting, edge);
         edges.par_iter().map_init(|| asker.clone(), ask).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Returns an error unless a motion is one of this robot: with a polynomial for each joint value, and valid ends. A quaternion's
+    /// polynomials are straight.
+    ///
+    /// # Errors
+    /// [`RobotError::Count`] and [`RobotError::Value`].
+    pub fn check_edge(&self, edge: &Edge) -> Result<(), RobotError> {
+        check(&self.setting, edge)
     }
 
     /// Returns whether a motion is free, and otherwise what touches first, and when.
@@ -197,6 +228,18 @@ impl Robot {
     pub fn motion(&mut self, edge: &Edge, options: &MotionOptions) -> Result<RobotMotion, RobotError> {
         self.refresh();
         self.asker.motion(&self.setting, edge, options)
+    }
+
+    /// Returns for each of many motions what [`Robot::motion`] does. Uses all threads of the rayon pool in which it is called.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`], of the first motion that has one.
+    pub fn motions(
+        &mut self,
+        edges: &[Edge],
+        options: &MotionOptions,
+    ) -> Result<Vec<RobotMotion>, RobotError> {
+        self.many_edges(edges, |asker, setting, edge| asker.motion(setting, edge, options))
     }
 
     /// Returns what touches first on a path of straight motions through many configurations, with the number of the motion; `None`
@@ -229,7 +272,9 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<bool, RobotError> {
-        check(setting, edge, options)?;
+        check(setting, edge)?;
+        // Pairs that stay apart would not refuse them.
+        options.check()?;
         // Most motions that are not free touch at one of these.
         if options.clearance == 0.0 {
             for t in [1.0, 0.5, 0.25, 0.75] {
@@ -258,7 +303,9 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<RobotMotion, RobotError> {
-        check(setting, edge, options)?;
+        check(setting, edge)?;
+        // Pairs that stay apart would not refuse them.
+        options.check()?;
         let (mut free_until, mut first): (f64, Option<(bool, f64, usize, Distance)>) = (1.0, None);
         for (number, pair) in setting.pairs.iter().enumerate() {
             let path = PairPath::new(setting, pair, edge)?;
@@ -283,25 +330,19 @@ impl Asker {
         }
         let Some((is_hit, time, number, nearest)) = first else { return Ok(RobotMotion::Free) };
         let (joints, bodies) = (at(&setting.model, edge, time), bodies(setting, number));
+        self.place(setting, &joints)?;
+        let world = self.frame(setting, setting.pairs[number].a);
+        let points = [nearest.point_a, nearest.point_b].map(|point| world.place(point));
         Ok(if is_hit {
-            RobotMotion::Hit { free_until, touching_at: time, joints, bodies, nearest }
+            RobotMotion::Hit { free_until, touching_at: time, joints, bodies, nearest, points }
         } else {
-            RobotMotion::Near { free_until, at: time, joints, bodies, nearest }
+            RobotMotion::Near { free_until, at: time, joints, bodies, nearest, points }
         })
     }
 }
 
-/// Returns an error unless the edge is of all joint values, both ends are valid, and so are the options: no pair that stays apart
-/// would refuse them. Quaternions only turn at a constant rate.
-fn check(setting: &Setting, edge: &Edge, options: &MotionOptions) -> Result<(), RobotError> {
-    let is_finite = |number: f64| (0.0..=f64::MAX).contains(&number);
-    let refused = |found| Err(QueryError::from(found).into());
-    if !is_finite(options.clearance) {
-        return refused(NumberError::Clearance(options.clearance));
-    }
-    if let Some(found) = options.tolerance.filter(|&found| !is_finite(found) || found == 0.0) {
-        return refused(NumberError::Tolerance(found));
-    }
+/// Returns an error unless the edge is of all joint values, and both ends are valid. Quaternions only turn at a constant rate.
+fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
     let model = &setting.model;
     for t in [0.0, 1.0] {
         let numbers: Vec<f64> = edge.coefficients.iter().map(|of| value(of, t)).collect();

@@ -61,9 +61,9 @@ pub enum RobotError {
         source: OpenError,
     },
     /// A name is of nothing that the robot has.
-    #[error("expected the name of a {what}, found '{name}'; there are {}", known.join(", "))]
+    #[error("expected the name of {what}, found '{name}'; there are {}", known.join(", "))]
     Unknown {
-        /// What was looked for: a link, a joint, a body, a group or a state.
+        /// What was looked for, with its article: a link or a body, for example.
         what: &'static str,
         /// The name.
         name: String,

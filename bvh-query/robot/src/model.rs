@@ -138,7 +138,7 @@ impl Model {
     /// Returns the number of a link.
     pub(crate) fn link(&self, name: &str) -> Result<usize, RobotError> {
         self.links.iter().position(|link| link.name == name).ok_or_else(|| RobotError::Unknown {
-            what: "link",
+            what: "a link",
             name: name.to_owned(),
             known: self.links.iter().map(|link| link.name.clone()).collect(),
         })

@@ -306,6 +306,14 @@ impl Robot {
         model.links.iter().map(|link| Ok(frames[link.group].of(&link.origin).pose()?)).collect()
     }
 
+    /// Returns an error unless these are values for all joints.
+    ///
+    /// # Errors
+    /// [`RobotError::Count`] and [`RobotError::Value`].
+    pub fn check(&self, joints: &[f64]) -> Result<(), RobotError> {
+        self.setting.model.check(joints)
+    }
+
     /// Adds an obstacle: a body that stands in the world.
     ///
     /// # Errors
@@ -406,6 +414,8 @@ impl Robot {
         let mut parts = setting.parts.clone();
         for part in parts.iter_mut().filter(|part| part.body == number) {
             let (on, bare) = ((part.group, part.is_still), part.bare.clone());
+            // A radius of its own would make up for a negative margin.
+            bare.clone().rounded(margin)?;
             *part = Part::new(number, on, part.origin, bare, margin)?;
         }
         setting.parts = parts;
@@ -446,17 +456,43 @@ impl Robot {
         pairs.map(|pair| [name(pair.a), name(pair.b)]).collect()
     }
 
+    /// Returns the name of the body with a number; `None` if it was removed.
+    pub fn body_name(&self, number: usize) -> Option<&str> {
+        self.setting.bodies.get(number)?.as_ref().map(|body| body.name.as_str())
+    }
+
+    /// Returns the shapes of the body with a number, each with its pose: in the frame of its link or, for an obstacle, in the world. The
+    /// margin of the body is a part of their radii. Use them for questions that robots do not answer, such as contact regions.
+    ///
+    /// # Errors
+    /// [`RobotError::Pose`] if a shape is too far away.
+    pub fn shapes(&self, body: usize) -> Result<Vec<(OwnedShape, Pose)>, RobotError> {
+        let Setting { model, parts, bodies, .. } = &*self.setting;
+        let link = match bodies.get(body) {
+            Some(Some(of)) if of.is_link => Some(body),
+            Some(Some(of)) => of.link,
+            _ => None,
+        };
+        let frame = link.map_or(Frame::IDENTITY, |link| model.links[link].origin);
+        let placed = |part: &Part| Ok((part.shape.clone(), frame.relative(&part.origin).pose()?));
+        parts.iter().filter(|part| part.body == body).map(placed).collect()
+    }
+
     fn bodies(&self, a: &str, b: &str) -> Result<[usize; 2], RobotError> {
         let (a, b) = (self.body(a)?, self.body(b)?);
         Ok([a.min(b), a.max(b)])
     }
 
-    /// Returns the number of a body.
-    fn body(&self, name: &str) -> Result<usize, RobotError> {
+    /// Returns the number of a body. Links have the first ones, in the order of [`Robot::links`]. A robot and its clones give a number
+    /// to no other body after it was removed.
+    ///
+    /// # Errors
+    /// [`RobotError::Unknown`].
+    pub fn body(&self, name: &str) -> Result<usize, RobotError> {
         let bodies = &self.setting.bodies;
         let is_named = |body: &Option<Body>| body.as_ref().is_some_and(|body| body.name == name);
         bodies.iter().position(is_named).ok_or_else(|| RobotError::Unknown {
-            what: "body",
+            what: "a body",
             name: name.to_owned(),
             known: bodies.iter().flatten().map(|body| body.name.clone()).collect(),
         })
@@ -467,7 +503,7 @@ impl Robot {
         let bodies = &self.setting.bodies;
         let is_own = |number: &usize| bodies[*number].as_ref().is_some_and(|body| !body.is_link);
         self.body(name).ok().filter(is_own).ok_or_else(|| RobotError::Unknown {
-            what: "obstacle or attached object",
+            what: "an obstacle or attached object",
             name: name.to_owned(),
             known: bodies
                 .iter()

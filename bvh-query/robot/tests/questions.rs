@@ -144,9 +144,11 @@ fn free_motions_are_free_at_all_samples() {
             }
             match robot.motion(&edge, &MotionOptions::new()).unwrap() {
                 RobotMotion::Free => assert!(is_free),
-                RobotMotion::Hit { free_until, touching_at, joints, bodies, .. } => {
+                RobotMotion::Hit { free_until, touching_at, joints, bodies, nearest, points } => {
                     assert!(!is_free && free_until <= touching_at);
                     assert!(robot.pairs_in_contact(&joints).unwrap().contains(&bodies));
+                    let way: f64 = (0..3).map(|k| (points[0][k] - points[1][k]).powi(2)).sum();
+                    assert!((way.sqrt() - nearest.distance).abs() < 1e-9);
                     for step in 0..if free_until > 0.0 { 50 } else { 0 } {
                         let t = free_until * f64::from(step) / 50.0;
                         let q: Vec<f64> =
@@ -174,6 +176,52 @@ fn what_is_between_samples_is_found() {
     robot.remove("sheet").unwrap();
     assert!(robot.is_free(&from, &to).unwrap());
     assert_eq!(robot.first_hit([&from[..], &to[..], &from[..]], &MotionOptions::new()).unwrap(), None);
+}
+
+/// Binomials of a thousand are beyond all numbers of `f64`, and no bound may be lost with them.
+#[test]
+fn a_polynomial_of_many_coefficients_is_as_certain() {
+    let mut robot = arm(Base::Fixed);
+    robot.add_obstacle("pillar", block([0.1, 0.1, 1.5]), &at([0.45, 0.0, 0.75])).unwrap();
+    for count in [2, 32, 33, 1100] {
+        // The waist turns past the pillar, the later and the faster the more coefficients there are.
+        let mut waist = vec![0.0; count];
+        (waist[0], waist[count - 1]) = (-1.0, 2.0);
+        let edge = Edge::polynomials(vec![waist, vec![1.2], vec![0.0], vec![0.0]]);
+        assert!(!robot.is_edge_free(&edge, &MotionOptions::new()).unwrap(), "{count}");
+        let found = robot.motions(&[edge], &MotionOptions::new()).unwrap();
+        assert!(matches!(found[0], RobotMotion::Hit { .. }), "{count}: {found:?}");
+    }
+}
+
+#[test]
+fn a_radius_makes_up_for_no_negative_margin() {
+    let mut robot = arm(Base::Fixed);
+    robot.add_obstacle("ball", block([0.1; 3]).rounded(0.5).unwrap(), &at([2.0, 0.0, 0.0])).unwrap();
+    assert!(robot.set_margin("ball", -0.25).is_err());
+    robot.set_margin("ball", 0.25).unwrap();
+}
+
+#[test]
+fn bodies_keep_their_numbers() {
+    let mut robot = arm(Base::Fixed);
+    let links: Vec<String> = robot.links().map(str::to_owned).collect();
+    assert!(links.iter().enumerate().all(|(k, link)| robot.body(link).unwrap() == k));
+    robot.add_obstacle("one", block([0.1; 3]), &at([2.0, 0.0, 0.0])).unwrap();
+    let one = robot.body("one").unwrap();
+    assert_eq!(robot.body_name(one), Some("one"));
+    robot.attach("two", block([0.1; 3]), "hand", &at([0.0, 0.0, 0.5]), &[]).unwrap();
+    robot.set_margin("two", 0.25).unwrap();
+    for (name, place, radius) in [("one", [2.0, 0.0, 0.0], 0.0), ("two", [0.0, 0.0, 0.5], 0.25)] {
+        let shapes = robot.shapes(robot.body(name).unwrap()).unwrap();
+        assert_eq!((shapes.len(), shapes[0].0.shape().radius(), shapes[0].1), (1, radius, at(place)));
+    }
+    assert_eq!(robot.shapes(1).unwrap()[0].1.translation(), [0.0, 0.0, 0.07]);
+    assert!(robot.shapes(99).unwrap().is_empty());
+    robot.remove("one").unwrap();
+    robot.add_obstacle("one", block([0.1; 3]), &at([2.0, 0.0, 0.0])).unwrap();
+    assert!(robot.body("one").unwrap() != one && robot.body_name(one).is_none());
+    assert_eq!(robot.body_name(99), None);
 }
 
 #[test]

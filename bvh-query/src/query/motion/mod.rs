@@ -66,11 +66,12 @@ impl MotionOptions {
     pub fn tolerance(self, tolerance: impl Into<Option<f64>>) -> Self {
         Self { tolerance: tolerance.into(), ..self }
     }
-}
 
-impl MotionOptions {
-    /// Refuses invalid numbers.
-    pub(crate) fn check(&self) -> Result<(), QueryError> {
+    /// Returns an error for the numbers that every query refuses.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the clearance or the tolerance is not a valid number.
+    pub fn check(&self) -> Result<(), QueryError> {
         check(NumberError::Clearance, self.clearance)?;
         match self.tolerance {
             Some(found) if !found.is_finite() || found <= 0.0 => Err(NumberError::Tolerance(found).into()),
