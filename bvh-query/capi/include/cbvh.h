@@ -29,12 +29,13 @@
  * and never followed. A copy of the structure is the same handle, and must be freed only once. Handles that are not
  * freed live as long as the process. Use no handles in a child after fork() without exec().
  *
- * Threads. Functions may be called on any thread. Many threads may use a mesh, a path or a scene at the same time. Only
- * one thread at a time may use a querier or a tracker; a second one gets CBVH_BUSY. Make one querier for each thread. A
- * question is about a scene as it is when the question begins. Other threads may change the scene meanwhile, and nobody
- * waits for a question. A mesh, a path or a scene may be freed while other threads use it: it lives until their
- * questions end. cbvh_querier_set_parallel and cbvh_scene_set_parallel let one question use all cores. The number of threads is that of the environment variable
- * RAYON_NUM_THREADS or, without it, of the cores.
+ * Threads. Functions may be called on any thread. Many threads may use a mesh, a path, a scene or a robot at the same
+ * time. Only one thread at a time may use a querier or a tracker; a second one gets CBVH_BUSY. Make one querier for each
+ * thread. A question is about a scene or a robot as it is when the question begins. Other threads may change it
+ * meanwhile, and nobody waits for a question. A mesh, a path, a scene or a robot may be freed while other threads use
+ * it: it lives until their questions end. cbvh_querier_set_parallel, cbvh_scene_set_parallel and cbvh_robot_set_parallel
+ * let one question use all cores. The number of threads is that of the environment variable RAYON_NUM_THREADS or,
+ * without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
  * command cbvh and of the Rust library. They do not depend on how the calling thread rounds (fesetround), whether it
@@ -83,7 +84,7 @@ enum {
     CBVH_INVALID_HANDLE = 2,
     /* Another thread, or a function that called this one, uses the querier or tracker. */
     CBVH_BUSY = 3,
-    /* There is no object or instance of that number or name. */
+    /* There is no object, instance or body of that number or name. */
     CBVH_NOT_FOUND = 4,
     /* A list has more elements than its buffer has room for. */
     CBVH_BUFFER_TOO_SMALL = 5,
@@ -122,6 +123,8 @@ typedef struct cbvh_tracker { uint64_t id; } cbvh_tracker;
 typedef struct cbvh_path { uint64_t id; } cbvh_path;
 /* Many placed meshes. */
 typedef struct cbvh_scene { uint64_t id; } cbvh_scene;
+/* A robot among obstacles. */
+typedef struct cbvh_robot { uint64_t id; } cbvh_robot;
 
 /* ----------------------------------------------------------------------------------------------------------- poses */
 
@@ -1055,6 +1058,209 @@ cbvh_status cbvh_scene_any_hits(cbvh_scene scene, const cbvh_ray *rays, size_t c
 cbvh_status cbvh_scene_all_hits(cbvh_scene scene, const cbvh_ray *rays, size_t ray_count, size_t *counts,
                                 cbvh_ray_hit *hits, size_t capacity, size_t *count);
 cbvh_status cbvh_scene_segment_hits(cbvh_scene scene, const cbvh_segment *segments, size_t count, bool *answers);
+
+/* ---------------------------------------------------------------------------------------------------------- robots
+ *
+ * A robot from a URDF file, obstacles and attached objects, asked about with the values of joints. A body is a link, an
+ * obstacle or an attached object. Questions are about all pairs of bodies that can move against each other, except those
+ * whose contact is allowed, by cbvh_robot_set_allowed or by the SRDF file. Links that only fixed joints connect are never
+ * asked about with each other, and neither are obstacles. The frame of the root link is the world, unless the base moves.
+ * Lengths are in metres, the unit of URDF files, and angles in radians.
+ *
+ * Functions that change a robot name bodies, and answers number them. Threads may ask about a robot while others change
+ * it, as for scenes.
+ *
+ * A configuration has `joint_count` numbers, in the order of cbvh_robot_joint_name. Arrays have `count` configurations,
+ * one after the other. CBVH_INVALID_ARGUMENT unless `joint_count` is that of the robot, and if a number is not finite or
+ * the quaternion of a floating joint is far from length 1. Limits of joints are not checked. */
+
+/* How the root of a robot is connected with the world. */
+typedef int32_t cbvh_robot_base;
+enum {
+    /* It stands at the origin. */
+    CBVH_BASE_FIXED = 0,
+    /* It moves in the plane z = 0: three more joint values come first, base/x, base/y and base/theta. */
+    CBVH_BASE_PLANAR = 1,
+    /* It moves freely: seven more joint values come first, base/x to base/z and a quaternion, base/qx to base/qw. */
+    CBVH_BASE_FLOATING = 2
+};
+
+/* How a robot is read. */
+typedef struct cbvh_robot_options {
+    size_t size;
+    /* Folders in which packages (package://) are looked for, before those of the environment variable ROS_PACKAGE_PATH
+     * and those above the URDF file. */
+    const char *const *packages;
+    size_t package_count;
+    /* An SRDF file with pairs whose contact is allowed, groups and states; NULL for none. */
+    const char *srdf;
+    /* A folder for baked meshes, so that each is baked once; NULL for none. It is made if it is not there. */
+    const char *cache;
+    /* A cylinder becomes a prism that reaches beyond it by at most this part of its radius; 0 for 1/1000. */
+    double cylinder_error;
+    /* Asks about the visual shapes of links (1) or their collision shapes (0). */
+    int32_t visual;
+    cbvh_robot_base base;
+} cbvh_robot_options;
+
+/* A body of a robot. 0 is none. A robot and its clones never give the number of a removed body again. */
+typedef struct cbvh_body { uint64_t id; } cbvh_body;
+
+/* Two bodies, in the order of cbvh_robot_pairs. */
+typedef struct cbvh_body_pair {
+    cbvh_body a;
+    cbvh_body b;
+} cbvh_body_pair;
+
+/* Reads a URDF file, and bakes the shapes of its links: meshes (OBJ, STL, PLY, glTF, COLLADA), boxes, spheres, cylinders
+ * and capsules. CBVH_SYSTEM if a file is not there or may not be read, CBVH_INVALID_ARGUMENT if a description is not
+ * valid, CBVH_BAKE_FAILED if a mesh cannot be baked, CBVH_DAMAGED if a file in the cache is. The message names the file
+ * and the element. */
+cbvh_status cbvh_robot_from_urdf(const char *path, const cbvh_robot_options *options, cbvh_robot *robot);
+/* Makes a copy of a robot with the same bodies, which shares their meshes. It takes about a microsecond. */
+cbvh_status cbvh_robot_clone(cbvh_robot robot, cbvh_robot *other);
+/* Frees a robot. */
+cbvh_status cbvh_robot_free(cbvh_robot robot);
+/* Lets questions about many configurations or motions use all cores (1) or one (0, the default). */
+cbvh_status cbvh_robot_set_parallel(cbvh_robot robot, int32_t parallel);
+
+/* How much a robot has. */
+typedef struct cbvh_robot_counts {
+    /* The values of a configuration. */
+    size_t joints;
+    size_t links;
+    /* Groups and states are those of the SRDF file. */
+    size_t groups;
+    size_t states;
+} cbvh_robot_counts;
+
+/* Writes how many joint values, links, groups and states a robot has. */
+cbvh_status cbvh_robot_count(cbvh_robot robot, cbvh_robot_counts *counts);
+/* Writes names as cbvh_mesh_object_name does. CBVH_NOT_FOUND if there is nothing of the number. */
+cbvh_status cbvh_robot_name(cbvh_robot robot, char *buffer, size_t capacity, size_t *length);
+/* Of a joint value: the name of a joint that turns or slides, NAME/x, NAME/y and NAME/theta of a planar joint, and NAME/x
+ * to NAME/z and NAME/qx to NAME/qw of a floating one. Fixed joints and those that mimic others have no values. */
+cbvh_status cbvh_robot_joint_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
+cbvh_status cbvh_robot_group_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
+cbvh_status cbvh_robot_state_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
+/* Of the group that a state is of. */
+cbvh_status cbvh_robot_state_group(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
+
+/* The limits of a joint value, infinite where there are none. */
+typedef struct cbvh_joint_limits {
+    double lower;
+    double upper;
+} cbvh_joint_limits;
+
+/* A joint value by its place in a configuration. */
+typedef struct cbvh_joint_value {
+    size_t joint;
+    double value;
+} cbvh_joint_value;
+
+/* Lists the limits of all joint values. */
+cbvh_status cbvh_robot_limits(cbvh_robot robot, cbvh_joint_limits *limits, size_t capacity, size_t *count);
+/* Lists the places of the joint values that a group moves, ascending. */
+cbvh_status cbvh_robot_group_joints(cbvh_robot robot, size_t number, size_t *joints, size_t capacity, size_t *count);
+/* Lists the joint values of a state. */
+cbvh_status cbvh_robot_state_values(cbvh_robot robot, size_t number, cbvh_joint_value *values, size_t capacity,
+                                    size_t *count);
+/* Lists the links, each after the link that it hangs from: this is the order of cbvh_robot_link_poses. */
+cbvh_status cbvh_robot_links(cbvh_robot robot, cbvh_body *links, size_t capacity, size_t *count);
+/* Writes the body with a name. CBVH_NOT_FOUND if there is none. */
+cbvh_status cbvh_robot_find(cbvh_robot robot, const char *name, cbvh_body *body);
+/* Writes the name of a body. CBVH_NOT_FOUND if there is none of the number, or if it was removed. */
+cbvh_status cbvh_robot_body_name(cbvh_robot robot, cbvh_body body, char *buffer, size_t capacity, size_t *length);
+/* Makes a handle of a shape of a body, to be freed, and writes its pose in the frame of its link or, for an obstacle, in
+ * the world. The margin of the body is a part of its radius. This is for questions that robots do not answer, such as
+ * cbvh_patches. CBVH_NOT_FOUND if there are no more shapes than `number`. */
+cbvh_status cbvh_robot_shape(cbvh_robot robot, cbvh_body body, size_t number, cbvh_mesh *mesh, cbvh_pose *pose);
+/* Lists the pairs that are asked about. */
+cbvh_status cbvh_robot_pairs(cbvh_robot robot, cbvh_body_pair *pairs, size_t capacity, size_t *count);
+
+/* Adds an obstacle, which stands in the world. No other body may have its name. `body` may be NULL. The handle of the
+ * mesh may be freed afterwards. */
+cbvh_status cbvh_robot_add_obstacle(cbvh_robot robot, const char *name, cbvh_mesh mesh, const cbvh_pose *pose,
+                                    cbvh_body *body);
+/* Attaches an object to a link, at a pose in the link's frame. It may touch that link and those of `may_touch`. */
+cbvh_status cbvh_robot_attach(cbvh_robot robot, const char *name, cbvh_mesh mesh, const char *link,
+                              const cbvh_pose *pose, const char *const *may_touch, size_t may_touch_count,
+                              cbvh_body *body);
+/* Removes an obstacle or an attached object, and what was set about it. CBVH_NOT_FOUND for a link. */
+cbvh_status cbvh_robot_remove(cbvh_robot robot, const char *name);
+/* Moves an obstacle, or an attached object in the frame of its link. CBVH_NOT_FOUND for a link. */
+cbvh_status cbvh_robot_set_pose(cbvh_robot robot, const char *name, const cbvh_pose *pose);
+/* Gives a body a margin of at least 0, which is added to the radii of its shapes in every question. It is 0 at first. */
+cbvh_status cbvh_robot_set_margin(cbvh_robot robot, const char *name, double margin);
+/* Allows two bodies to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
+cbvh_status cbvh_robot_set_allowed(cbvh_robot robot, const char *a, const char *b, int32_t allowed);
+
+/* A pair that touches often. */
+typedef struct cbvh_frequent_pair {
+    cbvh_body_pair pair;
+    /* The part of the configurations in which it touches. */
+    double share;
+} cbvh_frequent_pair;
+
+/* Allows the pairs that touch in at least this share of some random configurations within the limits, and lists them. The
+ * configurations are the same each time. If there is too little room for the list, nothing is allowed. */
+cbvh_status cbvh_robot_allow_frequent(cbvh_robot robot, size_t samples, double share, cbvh_frequent_pair *pairs,
+                                      size_t capacity, size_t *count);
+
+/* The nearest pair. */
+typedef struct cbvh_robot_distance_answer {
+    cbvh_body_pair pair;
+    /* Its points are in the world. */
+    cbvh_distance_answer nearest;
+    /* 1, or 0 if there are no pairs; the numbers are then NaN or 0. */
+    int32_t found;
+    int32_t reserved;
+} cbvh_robot_distance_answer;
+
+/* Lists the poses of all links in the world, in the order of cbvh_robot_links, configuration after configuration. */
+cbvh_status cbvh_robot_link_poses(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
+                                  cbvh_pose *poses, size_t capacity, size_t *pose_count);
+/* Answers for each configuration whether any pair touches. */
+cbvh_status cbvh_robot_collide(cbvh_robot robot, const double *joints, size_t joint_count, size_t count, bool *answers);
+/* Answers which pair is nearest, and how far apart it is. */
+cbvh_status cbvh_robot_distances(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
+                                 cbvh_robot_distance_answer *answers);
+/* Lists the pairs that touch, configuration after configuration. `counts` gets the number of each, and may be NULL. */
+cbvh_status cbvh_robot_pairs_in_contact(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
+                                        size_t *counts, cbvh_body_pair *pairs, size_t capacity, size_t *pair_count);
+
+/* Whether a motion of a robot is free, and where it ends. */
+typedef struct cbvh_robot_motion_answer {
+    cbvh_outcome outcome;
+    int32_t reserved;
+    /* Before this time certainly no pair is within the clearance; 1 if the motion is free. */
+    double free_until;
+    /* The earliest time found at which a pair is, or may be, within the clearance; NaN if the motion is free. */
+    double at;
+    /* The pair; 0 if the motion is free. */
+    cbvh_body_pair pair;
+    /* Its distance at that time, with points in the world. NaN if the motion is free. */
+    cbvh_distance_answer nearest;
+} cbvh_robot_motion_answer;
+
+/* Answers whether each motion from a start to an end is certainly free, at every moment. Each joint moves at a constant
+ * rate, and a floating one turns about one axis, the shorter way. A path through `n` configurations is `n - 1` motions:
+ * pass it for the starts, and its second configuration for the ends. */
+cbvh_status cbvh_robot_edges_are_free(cbvh_robot robot, const double *starts, const double *ends, size_t joint_count,
+                                      size_t count, const cbvh_motion_options *options, bool *answers);
+/* Answers whether each of these motions is free, and otherwise what touches first, and when. */
+cbvh_status cbvh_robot_edge_motions(cbvh_robot robot, const double *starts, const double *ends, size_t joint_count,
+                                    size_t count, const cbvh_motion_options *options,
+                                    cbvh_robot_motion_answer *answers);
+/* These functions answer the same about motions on which each joint value follows a polynomial of time from 0 to 1.
+ * Motion after motion, and joint value after joint value, there are `coefficient_count` coefficients, the constant first.
+ * The numbers of a quaternion must follow straight lines: their coefficients after the second are 0, and there are at
+ * most two. */
+cbvh_status cbvh_robot_are_free(cbvh_robot robot, const double *coefficients, size_t coefficient_count,
+                                size_t joint_count, size_t count, const cbvh_motion_options *options, bool *answers);
+cbvh_status cbvh_robot_motions(cbvh_robot robot, const double *coefficients, size_t coefficient_count,
+                               size_t joint_count, size_t count, const cbvh_motion_options *options,
+                               cbvh_robot_motion_answer *answers);
 
 #ifdef __cplusplus
 }

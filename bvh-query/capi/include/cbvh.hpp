@@ -1,8 +1,8 @@
 // cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. This header wraps cbvh.h,
 // which documents the questions: shapes, units, costs and threads.
 //
-// Meshes and paths may be shared by threads; make a Querier for each thread. A Scene may be asked while others change it. Objects that were moved from
-// hold no handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
+// Meshes and paths may be shared by threads; make a Querier for each thread. A Scene and a Robot may be asked while others
+// change them. Objects that were moved from hold no handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
 #ifndef CBVH_HPP
 #define CBVH_HPP
 
@@ -34,6 +34,13 @@ inline bool operator==(cbvh_instance a, cbvh_instance b) { return a.id == b.id; 
 inline bool operator!=(cbvh_instance a, cbvh_instance b) { return a.id != b.id; }
 inline bool operator<(cbvh_instance a, cbvh_instance b) { return a.id < b.id; }
 
+inline bool operator==(cbvh_body a, cbvh_body b) { return a.id == b.id; }
+inline bool operator!=(cbvh_body a, cbvh_body b) { return a.id != b.id; }
+inline bool operator<(cbvh_body a, cbvh_body b) { return a.id < b.id; }
+
+template <> struct std::hash<cbvh_body> {
+    std::size_t operator()(cbvh_body body) const noexcept { return std::hash<std::uint64_t>()(body.id); }
+};
 template <> struct std::hash<cbvh_instance> {
     std::size_t operator()(cbvh_instance instance) const noexcept { return std::hash<std::uint64_t>()(instance.id); }
 };
@@ -86,6 +93,7 @@ using RayHit = cbvh_ray_hit;
 using Segment = cbvh_segment;
 using MotionAnswer = cbvh_motion_answer;
 using Instance = cbvh_instance;
+using Body = cbvh_body;
 using Stats = cbvh_stats;
 
 /// A rigid placement, body to world: see cbvh_pose. Questions check that it is rigid.
@@ -1334,6 +1342,346 @@ private:
         }
         check(ask(instances.data(), paths.data(), &raw_options));
     }
+    detail::Room room_;
+    Owned handle_;
+};
+
+/// How a robot is read: see cbvh_robot_options. Empty text stands for none.
+struct RobotOptions {
+    std::vector<std::string> packages;
+    std::string srdf;
+    std::string cache;
+    double cylinder_error = 0;
+    bool visual = false;
+    cbvh_robot_base base = CBVH_BASE_FIXED;
+};
+
+/// A robot among obstacles, asked about with the values of its joints, which are in the order of joints(). Threads may ask
+/// while others change it: each question is about the robot as it is when the question begins. Copies share the meshes.
+class Robot {
+public:
+    using Joints = std::vector<double>;
+    /// A group of joints, by their places.
+    struct Group {
+        std::string name;
+        std::vector<std::size_t> joints;
+    };
+    /// A named configuration of a group.
+    struct State {
+        std::string name;
+        std::string group;
+        std::vector<cbvh_joint_value> values;
+    };
+    /// A motion on which each joint value follows a polynomial of time from 0 to 1: its coefficients, the constant first.
+    struct Polynomials {
+        std::vector<std::vector<double>> coefficients;
+    };
+
+    static Robot from_urdf(const std::string &path, const RobotOptions &options = {}) {
+        const auto packages = texts("options.packages", options.packages);
+        const auto text = [](const char *name, const std::string &of) {
+            return of.empty() ? nullptr : detail::c_text(name, of);
+        };
+        cbvh_robot_options raw_options{};
+        raw_options.size = sizeof raw_options;
+        raw_options.packages = packages.data();
+        raw_options.package_count = packages.size();
+        raw_options.srdf = text("options.srdf", options.srdf);
+        raw_options.cache = text("options.cache", options.cache);
+        raw_options.cylinder_error = options.cylinder_error;
+        raw_options.visual = options.visual;
+        raw_options.base = options.base;
+        return made([&](cbvh_robot *robot) {
+            return cbvh_robot_from_urdf(detail::c_text("path", path), &raw_options, robot);
+        });
+    }
+    Robot(Robot &&) noexcept = default;
+    Robot &operator=(Robot &&) noexcept = default;
+    Robot(const Robot &other) : Robot(made([&](cbvh_robot *robot) { return cbvh_robot_clone(other.raw(), robot); })) {}
+    Robot &operator=(const Robot &other) {
+        *this = Robot(other);
+        return *this;
+    }
+    ~Robot() = default;
+    cbvh_robot raw() const noexcept { return handle_.raw(); }
+
+    void set_parallel(bool parallel) { check(cbvh_robot_set_parallel(raw(), parallel)); }
+
+    std::string name() const {
+        return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+            return cbvh_robot_name(raw(), buffer, capacity, length);
+        });
+    }
+    /// The names of the joint values.
+    std::vector<std::string> joints() const {
+        std::vector<std::string> names;
+        for (std::size_t number = 0; number < counts().joints; number++) {
+            names.push_back(text(cbvh_robot_joint_name, number));
+        }
+        return names;
+    }
+    std::vector<cbvh_joint_limits> limits() const {
+        return detail::list<cbvh_joint_limits>([&](cbvh_joint_limits *limits, std::size_t capacity, std::size_t *count) {
+            return cbvh_robot_limits(raw(), limits, capacity, count);
+        });
+    }
+    /// The names of the links, in the order of link_poses.
+    std::vector<std::string> links() const {
+        std::vector<std::string> names;
+        for (const Body link : detail::list<Body>([&](Body *links, std::size_t capacity, std::size_t *count) {
+                 return cbvh_robot_links(raw(), links, capacity, count);
+             })) {
+            names.push_back(name(link));
+        }
+        return names;
+    }
+    std::vector<Group> groups() const {
+        std::vector<Group> groups;
+        for (std::size_t number = 0; number < counts().groups; number++) {
+            groups.push_back({text(cbvh_robot_group_name, number),
+                              detail::list<std::size_t>(
+                                  [&](std::size_t *joints, std::size_t capacity, std::size_t *count) {
+                                      return cbvh_robot_group_joints(raw(), number, joints, capacity, count);
+                                  })});
+        }
+        return groups;
+    }
+    std::vector<State> states() const {
+        std::vector<State> states;
+        for (std::size_t number = 0; number < counts().states; number++) {
+            states.push_back({text(cbvh_robot_state_name, number), text(cbvh_robot_state_group, number),
+                              detail::list<cbvh_joint_value>(
+                                  [&](cbvh_joint_value *values, std::size_t capacity, std::size_t *count) {
+                                      return cbvh_robot_state_values(raw(), number, values, capacity, count);
+                                  })});
+        }
+        return states;
+    }
+    /// The body with a name, if there is one.
+    std::optional<Body> find(const std::string &name) const {
+        Body body{0};
+        const cbvh_status status = cbvh_robot_find(raw(), detail::c_text("name", name), &body);
+        if (status == CBVH_NOT_FOUND) {
+            return std::nullopt;
+        }
+        check(status);
+        return body;
+    }
+    std::string name(Body body) const {
+        return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+            return cbvh_robot_body_name(raw(), body, buffer, capacity, length);
+        });
+    }
+    /// The shapes of a body with their poses in the frame of its link or, for an obstacle, in the world: see
+    /// cbvh_robot_shape.
+    std::vector<std::pair<Mesh, Pose>> shapes(Body body) const {
+        check_body(body);
+        std::vector<std::pair<Mesh, Pose>> shapes;
+        for (;;) {
+            cbvh_mesh mesh{0};
+            Pose pose;
+            const cbvh_status status = cbvh_robot_shape(raw(), body, shapes.size(), &mesh, &pose);
+            if (status == CBVH_NOT_FOUND) {
+                return shapes;
+            }
+            check(status);
+            shapes.emplace_back(Mesh(mesh), pose);
+        }
+    }
+    /// The pairs that are asked about.
+    std::vector<cbvh_body_pair> pairs() const {
+        return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+            return cbvh_robot_pairs(raw(), pairs, capacity, count);
+        });
+    }
+
+    /// Adds an obstacle at a pose in the world.
+    Body add_obstacle(const std::string &name, const Mesh &mesh, const Pose &pose = {}) {
+        Body body{0};
+        check(cbvh_robot_add_obstacle(raw(), detail::c_text("name", name), mesh.raw(), &pose, &body));
+        return body;
+    }
+    /// Attaches an object to a link, at a pose in the link's frame. It may touch that link and the given ones.
+    Body attach(const std::string &name, const Mesh &mesh, const std::string &link, const Pose &pose = {},
+                const std::vector<std::string> &may_touch = {}) {
+        Body body{0};
+        const auto touched = texts("may_touch", may_touch);
+        check(cbvh_robot_attach(raw(), detail::c_text("name", name), mesh.raw(), detail::c_text("link", link), &pose,
+                                touched.data(), touched.size(), &body));
+        return body;
+    }
+    void remove(const std::string &name) { check(cbvh_robot_remove(raw(), detail::c_text("name", name))); }
+    void set_pose(const std::string &name, const Pose &pose) {
+        check(cbvh_robot_set_pose(raw(), detail::c_text("name", name), &pose));
+    }
+    void set_margin(const std::string &name, double margin) {
+        check(cbvh_robot_set_margin(raw(), detail::c_text("name", name), margin));
+    }
+    void set_allowed(const std::string &a, const std::string &b, bool allowed) {
+        check(cbvh_robot_set_allowed(raw(), detail::c_text("a", a), detail::c_text("b", b), allowed));
+    }
+    /// Allows the pairs that touch in this share of random configurations, and returns them.
+    std::vector<cbvh_frequent_pair> allow_frequent(std::size_t samples, double share) {
+        return detail::list<cbvh_frequent_pair>(
+            [&](cbvh_frequent_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return cbvh_robot_allow_frequent(raw(), samples, share, pairs, capacity, count);
+            });
+    }
+
+    /// The poses of all links in the world.
+    std::vector<Pose> link_poses(const Joints &joints) const {
+        std::vector<Pose> poses(counts().links);
+        std::size_t count = 0;
+        check(cbvh_robot_link_poses(raw(), joints.data(), joints.size(), 1, poses.data(), poses.size(), &count));
+        return poses;
+    }
+    std::vector<std::vector<Pose>> link_poses(const std::vector<Joints> &joints) const {
+        const Rows rows("joints", joints);
+        const std::size_t links = counts().links;
+        std::vector<Pose> poses(links * rows.count);
+        std::size_t count = 0;
+        check(cbvh_robot_link_poses(raw(), rows.data(), width(rows), rows.count, poses.data(), poses.size(), &count));
+        return detail::divided(poses, std::vector<std::size_t>(rows.count, links));
+    }
+    bool collide(const Joints &joints) const {
+        bool answer = false;
+        check(cbvh_robot_collide(raw(), joints.data(), joints.size(), 1, &answer));
+        return answer;
+    }
+    std::vector<bool> collide(const std::vector<Joints> &joints) const {
+        const Rows rows("joints", joints);
+        return detail::choices(rows.count, [&](bool *answers) {
+            return cbvh_robot_collide(raw(), rows.data(), width(rows), rows.count, answers);
+        });
+    }
+    /// The nearest pair, if there is any pair.
+    std::optional<cbvh_robot_distance_answer> distance(const Joints &joints) const {
+        cbvh_robot_distance_answer answer{};
+        check(cbvh_robot_distances(raw(), joints.data(), joints.size(), 1, &answer));
+        return detail::found(answer);
+    }
+    std::vector<std::optional<cbvh_robot_distance_answer>> distance(const std::vector<Joints> &joints) const {
+        const Rows rows("joints", joints);
+        return detail::found<cbvh_robot_distance_answer>(
+            rows.count, [&](cbvh_robot_distance_answer *answers) {
+                return cbvh_robot_distances(raw(), rows.data(), width(rows), rows.count, answers);
+            });
+    }
+    std::vector<cbvh_body_pair> pairs_in_contact(const Joints &joints) const {
+        return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+            return cbvh_robot_pairs_in_contact(raw(), joints.data(), joints.size(), 1, nullptr, pairs, capacity, count);
+        });
+    }
+    std::vector<std::vector<cbvh_body_pair>> pairs_in_contact(const std::vector<Joints> &joints) {
+        const Rows rows("joints", joints);
+        return detail::lists<cbvh_body_pair>(
+            room_, rows.count,
+            [&](std::size_t *each, cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return cbvh_robot_pairs_in_contact(raw(), rows.data(), width(rows), rows.count, each, pairs, capacity,
+                                                   count);
+            });
+    }
+
+    /// Whether the straight motion from a start to an end is certainly free, at every moment.
+    bool is_free(const Joints &start, const Joints &end, const MotionOptions &options = {}) const {
+        return edges_are_free({start}, {end}, options)[0];
+    }
+    std::vector<bool> edges_are_free(const std::vector<Joints> &starts, const std::vector<Joints> &ends,
+                                     const MotionOptions &options = {}) const {
+        const Rows from("starts", starts), to("ends", ends, starts);
+        const cbvh_motion_options raw_options = options.raw();
+        return detail::choices(from.count, [&](bool *answers) {
+            return cbvh_robot_edges_are_free(raw(), from.data(), to.data(), width(from), from.count, &raw_options,
+                                             answers);
+        });
+    }
+    /// The same of a motion on polynomials.
+    bool is_free(const Polynomials &motion, const MotionOptions &options = {}) const {
+        const Rows rows(motion);
+        const cbvh_motion_options raw_options = options.raw();
+        bool answer = false;
+        check(cbvh_robot_are_free(raw(), rows.data(), rows.width, rows.count, 1, &raw_options, &answer));
+        return answer;
+    }
+    /// Whether a straight motion is free, and otherwise what touches first, and when.
+    cbvh_robot_motion_answer motion(const Joints &start, const Joints &end, const MotionOptions &options = {}) const {
+        return edge_motions({start}, {end}, options)[0];
+    }
+    std::vector<cbvh_robot_motion_answer> edge_motions(const std::vector<Joints> &starts,
+                                                       const std::vector<Joints> &ends,
+                                                       const MotionOptions &options = {}) const {
+        const Rows from("starts", starts), to("ends", ends, starts);
+        const cbvh_motion_options raw_options = options.raw();
+        return detail::answers<cbvh_robot_motion_answer>(from.count, [&](cbvh_robot_motion_answer *answers) {
+            return cbvh_robot_edge_motions(raw(), from.data(), to.data(), width(from), from.count, &raw_options,
+                                           answers);
+        });
+    }
+    cbvh_robot_motion_answer motion(const Polynomials &motion, const MotionOptions &options = {}) const {
+        const Rows rows(motion);
+        const cbvh_motion_options raw_options = options.raw();
+        cbvh_robot_motion_answer answer{};
+        check(cbvh_robot_motions(raw(), rows.data(), rows.width, rows.count, 1, &raw_options, &answer));
+        return answer;
+    }
+
+private:
+    using Owned = detail::Handle<cbvh_robot, cbvh_robot_free>;
+
+    /// Rows of numbers, one after the other.
+    struct Rows {
+        Rows(const char *name, const std::vector<Joints> &rows) : Rows(name, rows, rows) {}
+        /// As many as there are of others, and of the same length.
+        Rows(const char *name, const std::vector<Joints> &rows, const std::vector<Joints> &others)
+            : width(others.empty() ? 0 : others[0].size()), count(rows.size()) {
+            const std::string start = std::string(name) + ": expected ";
+            detail::same_length(count, others.size(), (start + "as many ends as starts").c_str());
+            for (const Joints &row : rows) {
+                detail::same_length(row.size(), width, (start + "as many numbers in each row").c_str());
+                numbers.insert(numbers.end(), row.begin(), row.end());
+            }
+        }
+        /// The coefficients of each joint value, and zeros where others have more.
+        explicit Rows(const Polynomials &motion) : width(1), count(motion.coefficients.size()) {
+            for (const auto &of : motion.coefficients) {
+                width = std::max(width, of.size());
+            }
+            for (const auto &of : motion.coefficients) {
+                numbers.insert(numbers.end(), of.begin(), of.end());
+                numbers.insert(numbers.end(), width - of.size(), 0);
+            }
+        }
+        const double *data() const { return numbers.data(); }
+        std::vector<double> numbers;
+        std::size_t width, count;
+    };
+
+    explicit Robot(cbvh_robot raw) : handle_(raw) {}
+    template <class Make> static Robot made(Make make) {
+        cbvh_robot robot{0};
+        check(make(&robot));
+        return Robot(robot);
+    }
+    static std::vector<const char *> texts(const char *name, const std::vector<std::string> &of) {
+        std::vector<const char *> all;
+        for (const std::string &text : of) {
+            all.push_back(detail::c_text(name, text));
+        }
+        return all;
+    }
+    cbvh_robot_counts counts() const {
+        cbvh_robot_counts counts{};
+        check(cbvh_robot_count(raw(), &counts));
+        return counts;
+    }
+    /// The number of joint values in a row. No rows are of the robot's.
+    std::size_t width(const Rows &rows) const { return rows.count == 0 ? counts().joints : rows.width; }
+    template <class Name> std::string text(Name of, std::size_t number) const {
+        return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+            return of(raw(), number, buffer, capacity, length);
+        });
+    }
+    void check_body(Body body) const { static_cast<void>(name(body)); }
     detail::Room room_;
     Owned handle_;
 };

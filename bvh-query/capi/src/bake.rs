@@ -3,7 +3,7 @@
 use crate::at_hand::MESHES;
 use crate::cores;
 use crate::entry::{entry, hand_out};
-use crate::input::{array, each, flag, optional, options, path, text};
+use crate::input::{each, flag, optional, options, path, pointers, text};
 use crate::output::One;
 use crate::status::Failure;
 use crate::types::{BakeChoices, MeshHandle};
@@ -137,12 +137,10 @@ pub unsafe extern "C" fn cbvh_bake_files(
 ) -> i32 {
     // SAFETY: the header asks for it.
     entry(|| unsafe {
-        let addresses = array("inputs", inputs, input_count)?;
-        if addresses.is_empty() {
+        let inputs = pointers("inputs", inputs, input_count, |name, of| path(name, of))?;
+        if inputs.is_empty() {
             return Err(Failure::argument("inputs", "at least one path", "none"));
         }
-        let read = |(number, input): (usize, &*const c_char)| path(&format!("inputs[{number}]"), *input);
-        let inputs: Vec<PathBuf> = addresses.iter().enumerate().map(read).collect::<Result<_, _>>()?;
         let (output, choices) = (path("output", output)?, choices(options)?);
         let up_to_date = optional(was_up_to_date, |_| One::new("was_up_to_date", was_up_to_date))?;
         let outcome = cores::work(|| {

@@ -17,16 +17,27 @@ pub(crate) fn work<R: Send>(work: impl FnOnce() -> Result<R, Failure> + Send) ->
     if may_use_all() {
         return work();
     }
-    let refused = |error: &dyn std::fmt::Display| Failure::new(Status::System, format!("a thread: {error}"));
-    let alone = || {
+    on_thread(|| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         pool.map_err(|error| refused(&error))?.install(work)
-    };
+    })
+}
+
+/// Does the same on a thread of its own: work that needs more stack than a caller has to have.
+pub(crate) fn work_apart<R: Send>(apart: impl FnOnce() -> Result<R, Failure> + Send) -> Result<R, Failure> {
+    if may_use_all() { on_thread(apart) } else { work(apart) }
+}
+
+fn on_thread<R: Send>(work: impl FnOnce() -> Result<R, Failure> + Send) -> Result<R, Failure> {
     std::thread::scope(|scope| {
         let thread =
-            std::thread::Builder::new().spawn_scoped(scope, alone).map_err(|error| refused(&error))?;
+            std::thread::Builder::new().spawn_scoped(scope, work).map_err(|error| refused(&error))?;
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
+}
+
+fn refused(error: &dyn std::fmt::Display) -> Failure {
+    Failure::new(Status::System, format!("a thread: {error}"))
 }
 
 #[cfg(test)]

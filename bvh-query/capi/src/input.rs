@@ -23,6 +23,7 @@ macro_rules! plain {
     )* };
 }
 plain!(u8: 0, u32: 0, i32: 0, u64: 0, usize: 0, f64: f64::NAN, *const c_char: ptr::null());
+plain!(*const *const c_char: ptr::null());
 
 // SAFETY: there are no bytes between the elements.
 unsafe impl<T: Plain, const N: usize> Plain for [T; N] {
@@ -152,6 +153,22 @@ pub(crate) unsafe fn path(name: &str, pointer: *const c_char) -> Result<PathBuf,
         // SAFETY: the caller vouches for it.
         unsafe { text(name, pointer) }.map(PathBuf::from)
     }
+}
+
+/// Reads an array of pointers, and what each of them leads to, by `read`.
+///
+/// # Safety
+/// As for `array`.
+pub(crate) unsafe fn pointers<R>(
+    name: &str,
+    pointers: *const *const c_char,
+    count: usize,
+    read: impl Fn(&str, *const c_char) -> Result<R, Failure>,
+) -> Result<Vec<R>, Failure> {
+    // SAFETY: the caller vouches for it.
+    let addresses = unsafe { array(name, pointers, count) }?;
+    let read = |(number, of): (usize, &*const c_char)| read(&format!("{name}[{number}]"), *of);
+    addresses.iter().enumerate().map(read).collect()
 }
 
 /// Reads something that a pointer leads to, by `read`, or nothing from a null pointer.

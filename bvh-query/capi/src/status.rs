@@ -4,6 +4,7 @@ use bvh_bake::{BakeError, ReadError, ShapeError};
 use bvh_query::{
     BackendError, InstanceError, OpenError, PathError, PoseError, QueryError, SceneError, SceneFileError,
 };
+use cbvh_robot::RobotError;
 use std::fmt::Display;
 
 /// The numbers of `cbvh_status`.
@@ -89,6 +90,17 @@ fn of_bake(error: &BakeError) -> Status {
     }
 }
 
+fn of_robot(error: &RobotError) -> Status {
+    match error {
+        RobotError::Io { .. } | RobotError::NoMesh { .. } => Status::System,
+        RobotError::Mesh { source, .. } => of_bake(source),
+        RobotError::Cache { source } => of_open(source),
+        RobotError::Unknown { .. } => Status::NotFound,
+        RobotError::Query(source) | RobotError::Pair { source, .. } => of_query(source),
+        _ => Status::InvalidArgument,
+    }
+}
+
 macro_rules! failures {
     ($($error:ty: $status:expr),*) => { $(
         impl From<$error> for Failure {
@@ -101,4 +113,4 @@ macro_rules! failures {
 failures!(QueryError: of_query, SceneError: of_scene, OpenError: of_open, BakeError: of_bake);
 failures!(InstanceError: of_instance, SceneFileError: of_scene_file, BackendError: |_| Status::InvalidArgument);
 failures!(PoseError: |_| Status::InvalidArgument, PathError: |_| Status::InvalidArgument);
-failures!(ShapeError: |_| Status::InvalidArgument);
+failures!(ShapeError: |_| Status::InvalidArgument, RobotError: of_robot);

@@ -20,6 +20,7 @@ pub(crate) enum Kind {
     Tracker,
     Path,
     Scene,
+    Robot,
 }
 
 /// The highest byte of the first kind.
@@ -28,7 +29,7 @@ const FIRST_KIND: u64 = 0xC1;
 /// Returns the name of the kind that a handle has, if it is one.
 fn name_of_kind(handle: u64) -> Option<&'static str> {
     let kind = (handle >> 56).checked_sub(FIRST_KIND)?;
-    ["mesh", "querier", "tracker", "path", "scene"].get(kind as usize).copied()
+    ["mesh", "querier", "tracker", "path", "scene", "robot"].get(kind as usize).copied()
 }
 
 const PARTS: usize = 64;

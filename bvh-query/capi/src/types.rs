@@ -42,7 +42,7 @@ macro_rules! handles {
         )*
     };
 }
-handles!(MeshHandle, QuerierHandle, TrackerHandle, PathHandle, SceneHandle, Instance);
+handles!(MeshHandle, QuerierHandle, TrackerHandle, PathHandle, SceneHandle, Instance, RobotHandle, Body);
 
 structures! {
     PoseRows { rows: [f64; 12] }
@@ -68,6 +68,16 @@ structures! {
         force: i32,
         solid: i32,
         allow_outside: i32,
+    }
+    RobotChoices {
+        size: usize,
+        packages: *const *const c_char,
+        package_count: usize,
+        srdf: *const c_char,
+        cache: *const c_char,
+        cylinder_error: f64,
+        visual: i32,
+        base: i32,
     }
     RayRow { origin: [f64; 3], direction: [f64; 3], until: f64 }
     SegmentRow { from: [f64; 3], to: [f64; 3] }
@@ -144,6 +154,20 @@ structures! {
     SceneRelationRow { pair: PairRow, relation: i32, reserved: i32 }
     SceneContactRow { pair: PairRow, contact: ContactRow }
     SceneClashRow { pair: PairRow, clash: ClashRow }
+    RobotCounts { joints: usize, links: usize, groups: usize, states: usize }
+    LimitsRow { lower: f64, upper: f64 }
+    JointValueRow { joint: usize, value: f64 }
+    BodyPairRow { a: Body, b: Body }
+    FrequentPairRow { pair: BodyPairRow, share: f64 }
+    RobotDistanceRow { pair: BodyPairRow, nearest: DistanceRow, found: i32, reserved: i32 }
+    RobotMotionRow {
+        outcome: i32,
+        reserved: i32,
+        free_until: f64,
+        at: f64,
+        pair: BodyPairRow,
+        nearest: DistanceRow,
+    }
 }
 
 macro_rules! numbers {
@@ -156,6 +180,7 @@ numbers!(CLASH_APART = 0, CLASH_NEAR = 1, CLASH_TOUCHING = 2, CLASH_OVERLAPPING 
 numbers!(CLASH_DUPLICATED = 5, CLASH_UNDECIDED = 6, CLASH_INTERSECTING = 7);
 numbers!(REGION_POINT = 0, REGION_SEGMENT = 1, REGION_POLYGON = 2);
 numbers!(SELF_CROSSING = 0, SELF_AT_CORNER = 1, SELF_FOLDED = 2, SELF_DUPLICATE = 3);
+numbers!(BASE_FIXED = 0, BASE_PLANAR = 1, BASE_FLOATING = 2);
 numbers!(FREE = 0, HIT = 1, NEAR = 2);
 numbers!(OUTSIDE = -1, ON = 0, INSIDE = 1, SIDE_UNDEFINED = 2, SIDE_NOT_ASKED = 3);
 
@@ -274,6 +299,17 @@ impl From<InstanceId> for Instance {
 impl From<Instance> for InstanceId {
     fn from(instance: Instance) -> Self {
         Self::from_bits(instance.id.wrapping_sub(1))
+    }
+}
+
+impl Body {
+    /// Adds one to the number of a body, so that none has the number 0.
+    pub(crate) fn of(number: usize) -> Self {
+        Self { id: number as u64 + 1 }
+    }
+
+    pub(crate) fn number(self) -> usize {
+        usize::try_from(self.id.wrapping_sub(1)).unwrap_or(usize::MAX)
     }
 }
 

@@ -1,4 +1,7 @@
-/* Little memory and little stack: not under sanitizers, which take more of both. */
+/* Little memory and little stack: not under sanitizers, which take more of both.
+ *
+ *     limits TESTDATA
+ */
 #include "support.h"
 #include <pthread.h>
 #include <sys/resource.h>
@@ -23,6 +26,8 @@ static cbvh_mesh fan(void) {
     OK(cbvh_bake(vertices, FAN + 2, faces, FAN, NULL, &mesh));
     return mesh;
 }
+
+static char urdf[1000];
 
 /* What the process has already, its threads included. */
 static rlim_t address_space(void) {
@@ -71,6 +76,11 @@ static void memory(void) {
     FAILS(cbvh_bake_voxels((const int32_t *)(const void *)numbers, many, 1, &made), CBVH_LIMIT, "cells: expected ");
     FAILS(cbvh_bake_convex_hull(numbers, many, &made), CBVH_LIMIT, "points: expected ");
     FAILS(cbvh_bake_height_field(numbers, many, 2, numbers, &made), CBVH_LIMIT, "heights: expected ");
+    cbvh_robot robot;
+    OK(cbvh_robot_from_urdf(urdf, NULL, &robot));
+    FAILS(cbvh_robot_collide(robot, numbers, 4, many / 4, &answer), CBVH_LIMIT, "joints: expected ");
+    FAILS(cbvh_robot_edges_are_free(robot, numbers, numbers, 4, many / 4, NULL, &answer), CBVH_LIMIT, "starts: expected ");
+    OK(cbvh_robot_free(robot));
     FAILS(cbvh_motions(querier, mesh, mesh, (const cbvh_path *)(const void *)numbers, many, NULL, &motion), CBVH_LIMIT,
           "paths: expected ");
     CHECK(setrlimit(RLIMIT_AS, &before) == 0);
@@ -142,6 +152,16 @@ static void *ask(void *parallel) {
     OK(cbvh_mesh_rounded(solid, 0.25, &padded));
     OK(cbvh_collide(querier, padded, other, &start, 1, &touching));
     OK(cbvh_distances(querier, padded, other, &start, 1, NULL, &apart));
+    cbvh_robot robot;
+    cbvh_robot_distance_answer near_robot[2];
+    cbvh_robot_motion_answer motion_of_robot;
+    const double zeros[8] = {0}, ends[4] = {3, 2, 2.5, 1};
+    OK(cbvh_robot_from_urdf(urdf, NULL, &robot));
+    OK(cbvh_robot_set_parallel(robot, cores));
+    OK(cbvh_robot_add_obstacle(robot, "obstacle", other, &near, NULL));
+    OK(cbvh_robot_distances(robot, zeros, 4, 2, near_robot));
+    OK(cbvh_robot_edge_motions(robot, zeros, ends, 4, 1, NULL, &motion_of_robot));
+    OK(cbvh_robot_free(robot));
     OK(cbvh_mesh_free(cylinder));
     OK(cbvh_mesh_free(solid));
     OK(cbvh_mesh_free(padded));
@@ -154,7 +174,9 @@ static void *ask(void *parallel) {
     return NULL;
 }
 
-int main(void) {
+int main(int count, char **arguments) {
+    CHECK(count == 2);
+    snprintf(urdf, sizeof urdf, "%s/robot/robot.urdf", arguments[1]);
     memory();
     pthread_attr_t attributes;
     CHECK(pthread_attr_init(&attributes) == 0);

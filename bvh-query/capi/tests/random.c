@@ -1,6 +1,8 @@
 /* Ten thousand calls with arguments at random: right ones, and each kind of wrong one. None crashes, reads or writes
  * where it must not (the address sanitizer looks on), or leaks; handles that calls made are freed, some of them twice.
- * */
+ *
+ *     random TESTDATA
+ */
 #include "support.h"
 
 #define CALLS 10000
@@ -25,7 +27,7 @@ static uint64_t any_handle(uint64_t likely) {
 static bool free_any(uint64_t handle) {
     return cbvh_mesh_free((cbvh_mesh){handle}) == CBVH_OK || cbvh_querier_free((cbvh_querier){handle}) == CBVH_OK ||
            cbvh_tracker_free((cbvh_tracker){handle}) == CBVH_OK || cbvh_path_free((cbvh_path){handle}) == CBVH_OK ||
-           cbvh_scene_free((cbvh_scene){handle}) == CBVH_OK;
+           cbvh_scene_free((cbvh_scene){handle}) == CBVH_OK || cbvh_robot_free((cbvh_robot){handle}) == CBVH_OK;
 }
 
 /* What calls may be given: arrays that hold `ELEMENTS` of anything, and numbers that are not plain. */
@@ -96,6 +98,13 @@ static const void *any_options(void) {
     }
 }
 
+static const cbvh_robot_options *any_robot_options(void) {
+    static cbvh_robot_options options;
+    options = (cbvh_robot_options){.size = below(4) ? sizeof options : below(sizeof options), .visual = any_flag(),
+        .cylinder_error = below(2) ? 0 : any_number(), .base = any_flag()};
+    return below(2) ? &options : NULL;
+}
+
 static int32_t any_pose(void *user, double t, cbvh_pose *pose) {
     (void)user;
     if (below(16) == 0) {
@@ -113,7 +122,7 @@ static double any_sagitta(void *user, double radius, double t0, double t1) {
     return below(8) ? 1e-9 : any_number();
 }
 
-int main(void) {
+int main(int argument_count, char **arguments) {
     const cbvh_mesh mesh = cube(1), other = cube(0.5);
     const cbvh_pose here = CBVH_IDENTITY, there = shift(3, 0, 0);
     cbvh_querier querier;
@@ -121,6 +130,13 @@ int main(void) {
     cbvh_path path;
     cbvh_scene scene;
     cbvh_instance instance;
+    cbvh_robot robot;
+    cbvh_body body;
+    char urdf[1000];
+    CHECK(argument_count == 2);
+    snprintf(urdf, sizeof urdf, "%s/robot/robot.urdf", arguments[1]);
+    OK(cbvh_robot_from_urdf(urdf, NULL, &robot));
+    OK(cbvh_robot_find(robot, "hand", &body));
     OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
     OK(cbvh_tracker_new(&tracker));
     OK(cbvh_path_between(&here, &there, &path));
@@ -138,6 +154,11 @@ int main(void) {
         const cbvh_path p = {any_handle(path.id)};
         const cbvh_scene s = {any_handle(scene.id)};
         const cbvh_instance i = {any_handle(instance.id)};
+        const cbvh_robot o = {any_handle(robot.id)};
+        const cbvh_body d = {any_handle(body.id)};
+        const char *const links[4] = {"base", "hand", below(8) ? "forearm" : "nothing", below(8) ? "x" : NULL};
+        const char *const link = links[below(4)];
+        const size_t joint_count = below(8) ? 4 : below(6);
         const cbvh_path paths[2] = {p, path};
         const cbvh_instance instances[2] = {i, instance};
         void *in = any_input(), *out = any_output();
@@ -149,7 +170,7 @@ int main(void) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(88)) {
+        switch (below(113)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -239,6 +260,36 @@ int main(void) {
         case 84: status = cbvh_self_contacts(q, a, out, capacity, &count); break;
         case 85: status = cbvh_clashes(q, a, b, in, n, options, out); break;
         case 86: status = cbvh_scene_clashes(s, options, out, capacity, &count); break;
+        case 87: status = cbvh_robot_from_urdf(below(4) ? urdf : name, any_robot_options(), (cbvh_robot *)&made); break;
+        case 88: status = cbvh_robot_clone(o, (cbvh_robot *)&made); break;
+        case 89: status = cbvh_robot_set_parallel(o, any_flag()); break;
+        case 90: status = cbvh_robot_count(o, out); break;
+        case 91: status = cbvh_robot_name(o, out, capacity, &count); break;
+        case 92: status = cbvh_robot_joint_name(o, any_count(), out, capacity, &count); break;
+        case 93: status = cbvh_robot_limits(o, out, capacity, &count); break;
+        case 94: status = cbvh_robot_group_joints(o, any_count(), out, capacity, &count); break;
+        case 95: status = cbvh_robot_state_values(o, any_count(), out, capacity, &count); break;
+        case 96: status = cbvh_robot_links(o, out, capacity, &count); break;
+        case 97: status = cbvh_robot_find(o, link, out); break;
+        case 98: status = cbvh_robot_body_name(o, d, out, capacity, &count); break;
+        case 99: status = cbvh_robot_shape(o, d, below(2), (cbvh_mesh *)&made, out); break;
+        case 100: status = cbvh_robot_pairs(o, out, capacity, &count); break;
+        case 101: status = cbvh_robot_add_obstacle(o, "x", a, in, below(2) ? NULL : (cbvh_body *)&count); break;
+        case 102: status = cbvh_robot_attach(o, "x", a, link, in, links, below(4), NULL); break;
+        case 103: status = cbvh_robot_remove(o, link); break;
+        case 104: status = cbvh_robot_set_pose(o, link, in); break;
+        case 105: status = cbvh_robot_set_margin(o, link, below(2) ? fabs(x) : x); break;
+        case 106: status = cbvh_robot_set_allowed(o, link, links[below(4)], any_flag()); break;
+        case 107: status = cbvh_robot_allow_frequent(o, below(4), x, out, capacity, &count); break;
+        case 108: status = below(2) ? cbvh_robot_collide(o, in, joint_count, n, out)
+                                    : cbvh_robot_distances(o, in, joint_count, n, out); break;
+        case 109: status = cbvh_robot_pairs_in_contact(o, in, joint_count, n, below(2) ? NULL : counts, out, capacity,
+            &count); break;
+        case 110: status = cbvh_robot_link_poses(o, in, joint_count, n, out, capacity, &count); break;
+        case 111: status = below(2) ? cbvh_robot_edges_are_free(o, in, more, joint_count, n, options, out)
+                                    : cbvh_robot_edge_motions(o, more, in, joint_count, n, options, out); break;
+        case 112: status = below(2) ? cbvh_robot_are_free(o, in, below(4), joint_count, n, options, out)
+                                    : cbvh_robot_motions(o, in, below(4), joint_count, n, options, out); break;
         default:
             /* Frees one, as every kind. */
             status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;
@@ -270,6 +321,7 @@ int main(void) {
     for (size_t place = 0; place < KEPT; place++) {
         free_any(kept[place]);
     }
+    OK(cbvh_robot_free(robot));
     OK(cbvh_scene_free(scene));
     OK(cbvh_path_free(path));
     OK(cbvh_tracker_free(tracker));

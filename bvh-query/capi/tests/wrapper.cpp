@@ -413,9 +413,73 @@ void shapes() {
     FAILS(scene.set_margin(b, std::numeric_limits<double>::quiet_NaN()), CBVH_INVALID_ARGUMENT, "margin: ");
 }
 
+void robots(const std::string &urdf) {
+    cbvh::Robot robot = cbvh::Robot::from_urdf(urdf);
+    using Joints = cbvh::Robot::Joints;
+    CHECK(robot.name() == "small_arm" && robot.joints() == std::vector<std::string>({"waist", "shoulder", "elbow", "wrist"}));
+    const std::vector<std::string> links{"base", "turret", "upper_arm", "forearm", "hand"};
+    CHECK(robot.links() == links && robot.limits()[1].upper == 2 && robot.groups().empty() && robot.states().empty());
+    CHECK(robot.pairs().size() == 10 && robot.shapes(*robot.find("turret"))[0].second.rows[11] == 0.07);
+    for (std::size_t k = 1; k < links.size(); k++) {
+        robot.set_allowed(links[k - 1], links[k], true);
+    }
+    const cbvh::Robot before = robot;
+    const Joints up(4), forward{0, 1.2, 0, 0}, aside{0.5, 1.2, 0, 0};
+    const std::vector<Joints> both{up, forward};
+    const cbvh::Mesh block = cbvh::Mesh::box({0.2, 0.2, 0.2}).solid();
+    const cbvh::Body box = robot.add_obstacle("box", block, cbvh::Pose::translation(0.5, 0, 0.46));
+    const cbvh::Body rod = robot.attach("rod", cbvh::Mesh::box({0.02, 0.02, 0.2}).solid(), "hand",
+                                         cbvh::Pose::translation(0, 0, 0.2), {"forearm"});
+    CHECK(robot.name(box) == "box" && robot.find("rod") == rod && !robot.find("x") && std::hash<cbvh::Body>()(box) > 0);
+    CHECK(!robot.collide(up) && robot.collide(forward) && !before.collide(forward));
+    for (const bool parallel : {false, true}) {
+        robot.set_parallel(parallel);
+        CHECK(robot.collide(both) == std::vector<bool>({false, true}) && robot.collide(std::vector<Joints>()).empty());
+        const auto distances = robot.distance(both);
+        CHECK(distances[0]->nearest.distance > 0 && distances[1]->nearest.distance == 0);
+        CHECK(robot.distance(up)->nearest.distance == distances[0]->nearest.distance);
+        const auto pairs = robot.pairs_in_contact(both);
+        CHECK(pairs[0].empty() && !pairs[1].empty() && pairs[1].size() == robot.pairs_in_contact(forward).size());
+        CHECK(robot.link_poses(both)[1][4].rows[3] == robot.link_poses(forward)[4].rows[3] && robot.link_poses(up).size() == 5);
+        CHECK(robot.edges_are_free(both, {forward, up}) == std::vector<bool>({false, false}));
+        const auto motions = robot.edge_motions(both, {forward, up});
+        CHECK(motions[0].outcome == CBVH_HIT && motions[1].at == 0 && motions[0].at == robot.motion(up, forward).at);
+    }
+    CHECK(before.is_free(up, forward) && before.motion(up, forward).outcome == CBVH_FREE && !before.is_free(up, forward, {9, 0}));
+    // The same motion as polynomials, and one that goes there and back before it reaches the box.
+    const cbvh::Robot::Polynomials line{{{0}, {0, 1.2}, {0}, {}}}, back{{{}, {0, 1, -1}, {}, {}}};
+    CHECK(robot.motion(line).at == robot.motion(up, forward).at && !robot.is_free(line) && robot.is_free(back));
+    robot.set_pose("box", cbvh::Pose::translation(3, 0, 0));
+    CHECK(!robot.collide(forward));
+    robot.set_margin("box", 3);
+    CHECK(robot.collide(forward) && robot.shapes(box)[0].first.radius() == 3);
+    robot.remove("box");
+    CHECK(!robot.collide(aside) && robot.allow_frequent(100, 2).empty());
+    FAILS(robot.name(box), CBVH_NOT_FOUND, "expected a body of the robot");
+    FAILS(robot.shapes(box), CBVH_NOT_FOUND, "expected a body of the robot");
+    FAILS(robot.remove("box"), CBVH_NOT_FOUND, "found 'box'");
+    FAILS(robot.collide(Joints(3)), CBVH_INVALID_ARGUMENT, "joint_count: expected 4");
+    FAILS(robot.collide({up, Joints(3)}), CBVH_INVALID_ARGUMENT, "joints: expected as many numbers in each row");
+    FAILS(robot.edges_are_free(both, {up}), CBVH_INVALID_ARGUMENT, "ends: expected as many ends as starts");
+    FAILS(robot.is_free({{{}, {}}}), CBVH_INVALID_ARGUMENT, "joint_count: expected 4");
+    FAILS(robot.collide({0, std::nan(""), 0, 0}), CBVH_INVALID_ARGUMENT, "joints[0]: joint shoulder: expected a finite value");
+    FAILS(cbvh::Robot::from_urdf("/no such folder/x.urdf"), CBVH_SYSTEM, "x.urdf");
+    FAILS(robot.add_obstacle(std::string("a\0b", 3), block), CBVH_INVALID_ARGUMENT, "expected text without zero bytes");
+    FAILS(robot.attach("a", block, "hand", {}, {std::string("a\0b", 3)}), CBVH_INVALID_ARGUMENT, "may_touch: expected text");
+    cbvh::RobotOptions options;
+    options.base = CBVH_BASE_FLOATING;
+    options.packages = {"/a", "/b"};
+    CHECK(cbvh::Robot::from_urdf(urdf, options).joints()[6] == "base/qw");
+    options.srdf = "/no such folder/x.srdf";
+    FAILS(cbvh::Robot::from_urdf(urdf, options), CBVH_SYSTEM, "x.srdf");
+    const cbvh::Robot moved = std::move(robot);
+    FAILS(robot.name(), CBVH_INVALID_HANDLE, "found 0, no handle"); // NOLINT: what is moved from holds none.
+}
+
 } // namespace
 
-int main() {
+int main(int count, char **arguments) {
+    CHECK(count == 2);
     poses();
     handles();
     answers(false);
@@ -425,6 +489,7 @@ int main() {
     motions();
     scenes();
     shapes();
+    robots(std::string(arguments[1]) + "/robot/robot.urdf");
     // A thread of its own has messages of its own.
     std::thread([] { FAILS(cbvh::Mesh::open(""), CBVH_SYSTEM, ""); }).join();
     std::puts("wrapper: C++ as the header says");

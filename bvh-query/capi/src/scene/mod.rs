@@ -1,38 +1,29 @@
 //! Scenes: many placed meshes.
 //!
-//! A question is about the scene as it is when the question begins: it takes a snapshot, and runs without any lock. So threads
-//! may ask while others change the scene, and nobody waits for a question. No function of the caller is called with the lock.
+//! A question is about the scene as it is when the question begins (`shared`).
 
 mod questions;
 
 use crate::at_hand::MESHES;
-use crate::cores;
 use crate::entry::{entry, hand_out, write};
 use crate::input::{self, array, flag, optional, text};
 use crate::mesh::check_regular;
 use crate::output::{self, List, One};
 use crate::poses;
+use crate::shared::{Shared, Snapshot};
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{self, Instance, MeshHandle, PoseRows, SceneHandle, StatsRow};
 use bvh_query::{Bvh, Groups, InstanceId, QueryStats, Scene, SceneShape};
 use std::ffi::c_char;
-use std::sync::{Arc, Mutex, MutexGuard};
 
-/// All scenes that are open.
-static SCENES: Table<Arc<Mutex<Asked>>> = Table::new(Kind::Scene);
+/// All scenes that are open, each with how much work the question that ended last took, and how many pairs it was about.
+static SCENES: Table<Shared<Scene, (QueryStats, u64)>> = Table::new(Kind::Scene);
 
-/// What the handle of a scene stands for.
-struct Asked {
-    scene: Scene,
-    /// Whether questions may use all cores, where they are not asked by a function of the caller.
-    parallel: bool,
-    /// How much work the question that ended last took, and how many pairs it was about.
-    stats: (QueryStats, u64),
-    /// Scenes that ask no question now. They hold what they remember of earlier ones, and no instances.
-    idle: Vec<Scene>,
-    /// A scene without instances, of the same backend.
-    empty: Scene,
+impl Snapshot for Scene {
+    fn snapshot(&mut self) -> Self {
+        Self::snapshot(self)
+    }
 }
 
 /// Makes a scene and another one of the same backend without instances, and hands the first out.
@@ -40,52 +31,31 @@ struct Asked {
 /// # Safety
 /// As for `hand_out`.
 unsafe fn make(scene: *mut SceneHandle, make: impl FnOnce() -> Result<[Scene; 2], Failure>) -> i32 {
-    let made = || {
-        let [scene, empty] = make()?;
-        let (parallel, stats, idle) = (false, Default::default(), Vec::new());
-        Ok(Arc::new(Mutex::new(Asked { scene, parallel, stats, idle, empty })))
-    };
+    let made = || make().map(|[scene, empty]| Shared::new(scene, empty));
     // SAFETY: the caller vouches for it.
     unsafe { hand_out(("scene", scene), &SCENES, made) }
 }
 
-/// Locks a scene for a moment.
-fn locked(shared: &Mutex<Asked>) -> Result<MutexGuard<'_, Asked>, Failure> {
-    let ended = "scene: a defect of cbvh ended its last use; free it, and make another one";
-    shared.lock().map_err(|_| Failure::new(Status::Internal, ended.to_owned()))
-}
-
 /// Looks at a scene or changes it.
-fn with<R>(scene: SceneHandle, act: impl FnOnce(&mut Asked) -> Result<R, Failure>) -> Result<R, Failure> {
+fn with<R>(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<R, Failure>) -> Result<R, Failure> {
     let shared = SCENES.share("scene", scene.id)?;
-    let mut asked = locked(&shared)?;
-    act(&mut asked)
+    let mut held = shared.lock("scene")?;
+    act(&mut held.now)
 }
 
 /// Looks at a scene or changes it. What `act` returns is dropped without the lock.
 fn see<R>(scene: SceneHandle, act: impl FnOnce(&mut Scene) -> Result<R, Failure>) -> i32 {
-    entry(|| with(scene, |asked| act(&mut asked.scene)).map(drop))
+    entry(|| with(scene, act).map(drop))
 }
 
 /// Asks a question about a scene as it is now.
 pub(crate) fn ask(scene: SceneHandle, ask: impl FnOnce(&mut Scene) -> Result<(), Failure>) -> i32 {
     entry(|| {
-        let shared = SCENES.share("scene", scene.id)?;
-        let (mut own, empty) = {
-            let asked = &mut *locked(&shared)?;
-            let snapshot = asked.scene.snapshot();
-            let mut own = asked.idle.pop().unwrap_or_else(|| snapshot.clone());
-            own.clone_from(&snapshot);
-            own.set_parallel(asked.parallel && cores::may_use_all());
-            (own, asked.empty.clone())
-        };
-        let answer = ask(&mut own);
-        let stats = (own.stats(), own.pairs_asked());
-        own.clone_from(&empty);
-        let mut asked = locked(&shared)?;
-        asked.stats = stats;
-        asked.idle.push(own);
-        answer
+        SCENES.share("scene", scene.id)?.ask("scene", |own, parallel| {
+            own.set_parallel(parallel);
+            let answer = ask(own);
+            (answer, (own.stats(), own.pairs_asked()))
+        })?
     })
 }
 
@@ -128,13 +98,7 @@ pub unsafe extern "C" fn cbvh_scene_of_mesh(mesh: MeshHandle, scene: *mut SceneH
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_clone(scene: SceneHandle, other: *mut SceneHandle) -> i32 {
-    let copy = || {
-        with(scene, |asked| {
-            let (scene, empty) = (asked.scene.clone(), asked.empty.clone());
-            let (parallel, stats, idle) = (asked.parallel, asked.stats, Vec::new());
-            Ok(Arc::new(Mutex::new(Asked { scene, parallel, stats, idle, empty })))
-        })
-    };
+    let copy = || SCENES.share("scene", scene.id)?.copy("scene");
     // SAFETY: the header asks for it.
     unsafe { hand_out(("other", other), &SCENES, copy) }
 }
@@ -146,12 +110,7 @@ pub extern "C" fn cbvh_scene_free(scene: SceneHandle) -> i32 {
 
 #[unsafe(no_mangle)]
 pub extern "C" fn cbvh_scene_set_parallel(scene: SceneHandle, parallel: i32) -> i32 {
-    entry(|| {
-        with(scene, |asked| {
-            asked.parallel = flag("parallel", parallel)?;
-            Ok(())
-        })
-    })
+    entry(|| SCENES.share("scene", scene.id)?.set_parallel("scene", parallel))
 }
 
 #[unsafe(no_mangle)]
@@ -189,10 +148,10 @@ pub unsafe extern "C" fn cbvh_scene_add(
         SCENES.share("scene", scene.id)?;
         let shape = MESHES.share("mesh", mesh.id)?;
         let (world, name) = (world?, name?);
-        let id = with(scene, |asked| {
+        let id = with(scene, |scene| {
             Ok(match name {
-                Some(name) => asked.scene.add_named(&name, shape.clone(), world)?,
-                None => asked.scene.add(shape.clone(), world)?,
+                Some(name) => scene.add_named(&name, shape.clone(), world)?,
+                None => scene.add(shape.clone(), world)?,
             })
         })?;
         out.iter_mut().for_each(|out| out.set(id.into()));
@@ -219,9 +178,9 @@ pub extern "C" fn cbvh_scene_set_mesh(scene: SceneHandle, instance: Instance, me
     entry(|| {
         SCENES.share("scene", scene.id)?;
         let shape = MESHES.share("mesh", mesh.id)?;
-        let held = with(scene, |asked| {
-            let held = held(&asked.scene, instance)?;
-            asked.scene.set_shape(instance.into(), shape.clone())?;
+        let held = with(scene, |scene| {
+            let held = held(scene, instance)?;
+            scene.set_shape(instance.into(), shape.clone())?;
             Ok(held)
         })?;
         drop(held);
@@ -370,7 +329,7 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
     instance: Instance,
     mesh: *mut MeshHandle,
 ) -> i32 {
-    let found = || Ok(with(scene, |asked| held(&asked.scene, instance))?.opened()?);
+    let found = || Ok(with(scene, |scene| held(scene, instance))?.opened()?);
     // SAFETY: the header asks for it.
     unsafe { hand_out(("mesh", mesh), &MESHES, found) }
 }
@@ -398,9 +357,9 @@ pub unsafe extern "C" fn cbvh_scene_pair_margin(
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_stats(scene: SceneHandle, stats: *mut StatsRow) -> i32 {
-    // SAFETY: the header asks for it.
-    let out = |asked: &mut Asked| unsafe {
-        write("stats", stats, || Ok(StatsRow::new(asked.stats.0, asked.stats.1)))
-    };
-    entry(|| with(scene, out))
+    entry(|| {
+        let (of, pairs) = SCENES.share("scene", scene.id)?.lock("scene")?.note;
+        // SAFETY: the header asks for it.
+        unsafe { write("stats", stats, || Ok(StatsRow::new(of, pairs))) }
+    })
 }
