@@ -454,6 +454,7 @@ static void misuse(void) {
     cbvh_robot_distance_answer nearest[3];
     cbvh_robot_motion_answer motion[3];
     cbvh_robot_counts sizes;
+    cbvh_frequent_pair pairs_of_many[1];
     cbvh_mesh shape;
     char text[10];
     /* Files and options. */
@@ -575,6 +576,8 @@ static void misuse(void) {
           "coefficients: expected at most");
     FAILS(cbvh_robot_motions(robot, joints, 1, JOINTS, 1, NULL, NULL), CBVH_INVALID_ARGUMENT, "answers: ");
     FAILS(cbvh_robot_allow_frequent(robot, 10, 0.5, NULL, 1, &count), CBVH_INVALID_ARGUMENT, "pairs: ");
+    FAILS(cbvh_robot_allow_frequent(robot, SIZE_MAX / 2, 0.5, pairs_of_many, 1, &count), CBVH_LIMIT, "samples: expected");
+    OK(cbvh_robot_allow_frequent(robot, 0, NAN, pairs_of_many, 1, &count));
     /* All of that changed nothing. */
     OK(cbvh_robot_collide(robot, joints, JOINTS, 3, answers));
     CHECK(!answers[0] && !answers[2]);

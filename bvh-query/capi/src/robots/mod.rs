@@ -2,23 +2,24 @@
 //!
 //! A question is about the robot as it is when the question begins (`shared`). Changes name bodies, and answers number them.
 
+mod questions;
+
 use crate::at_hand::MESHES;
 use crate::cores;
-use crate::entry::{entry, hand_out, questions, write};
-use crate::input::{self, each, flag, optional, path, pointers, reserve, text};
+use crate::entry::{entry, hand_out, write};
+use crate::input::{self, flag, optional, path, pointers, reserve, text};
 use crate::mesh::check_regular;
-use crate::output::{self, List, Lists, One, Room};
+use crate::output::{self, List, One};
 use crate::poses;
 use crate::shared::{Shared, Snapshot};
 use crate::status::{Failure, Status};
 use crate::table::{Kind, Table};
 use crate::types::{
-    BASE_FIXED, BASE_FLOATING, BASE_PLANAR, Body, BodyPairRow, FREE, FrequentPairRow, HIT, JointValueRow,
-    LimitsRow, MeshHandle, MotionChoices, NEAR, PoseRows, RobotChoices, RobotCounts, RobotDistanceRow,
-    RobotHandle, RobotMotionRow,
+    BASE_FIXED, BASE_FLOATING, BASE_PLANAR, Body, BodyPairRow, FrequentPairRow, JointValueRow, LimitsRow,
+    MeshHandle, PoseRows, RobotChoices, RobotCounts, RobotHandle,
 };
-use bvh_query::{MotionOptions, OwnedShape};
-use cbvh_robot::{Base, Edge, Geometry, Robot, RobotDistance, RobotError, RobotMotion, RobotOptions};
+use bvh_query::OwnedShape;
+use cbvh_robot::{Base, Geometry, Robot, RobotOptions};
 use std::ffi::c_char;
 
 /// All robots that are open.
@@ -379,7 +380,11 @@ pub unsafe extern "C" fn cbvh_robot_allow_frequent(
     entry(|| {
         // SAFETY: the header asks for it.
         let mut list = unsafe { List::new("pairs", pairs, capacity, count) }?;
-        let found = ask(robot, |own, _| cores::work(|| Ok(own.allow_frequent(samples, share)?)))?;
+        let found = ask(robot, |own, _| {
+            let numbers = samples.saturating_mul(own.joints().len());
+            reserve("samples", numbers, &mut Vec::<f64>::new())?;
+            cores::work(|| Ok(own.allow_frequent(samples, share)?))
+        })?;
         with(robot, |robot| {
             list.add(
                 found
@@ -398,299 +403,4 @@ fn ask<R>(
     ask: impl FnOnce(&mut Robot, bool) -> Result<R, Failure>,
 ) -> Result<R, Failure> {
     ROBOTS.share("robot", robot.id)?.ask("robot", |own, parallel| (ask(own, parallel), ()))?
-}
-
-/// Configurations, or other rows of numbers that a robot is asked about.
-struct Rows {
-    name: &'static str,
-    numbers: *const f64,
-    /// How many joint values a row is about, and how many numbers it has for each.
-    joints: usize,
-    per_joint: usize,
-    count: usize,
-}
-
-impl Rows {
-    /// Copies the numbers.
-    ///
-    /// # Safety
-    /// As for `array`.
-    unsafe fn read(&self, robot: &Robot) -> Result<Vec<f64>, Failure> {
-        let expected = robot.joints().len();
-        if self.joints != expected {
-            let expected = format!("{expected}, as many as the robot has joint values");
-            return Err(Failure::argument("joint_count", expected, self.joints));
-        }
-        let count = self.joints.saturating_mul(self.per_joint).saturating_mul(self.count);
-        let mut copied = Vec::new();
-        // SAFETY: the caller vouches for it.
-        unsafe { each(self.name, self.numbers, count, &mut copied, |number| Ok(*number)) }?;
-        Ok(copied)
-    }
-
-    /// Divides the numbers into rows. A robot may have no joint values.
-    fn of<'a>(&self, numbers: &'a [f64]) -> impl Iterator<Item = &'a [f64]> + use<'a> {
-        let length = self.joints * self.per_joint;
-        (0..self.count).map(move |row| &numbers[row * length..][..length])
-    }
-
-    /// Says in which row something was found.
-    fn at<'a>(&'a self, row: usize) -> impl Fn(RobotError) -> Failure + 'a {
-        move |error| Failure::from(error).at(format_args!("{}[{row}]", self.name))
-    }
-
-    /// Copies configurations, and checks them.
-    ///
-    /// # Safety
-    /// As for `array`.
-    unsafe fn configurations(&self, robot: &Robot) -> Result<Vec<f64>, Failure> {
-        // SAFETY: the caller vouches for it.
-        let numbers = unsafe { self.read(robot) }?;
-        for (row, joints) in self.of(&numbers).enumerate() {
-            robot.check(joints).map_err(self.at(row))?;
-        }
-        Ok(numbers)
-    }
-}
-
-/// A question about configurations.
-struct Configurations(RobotHandle, Rows);
-
-impl Configurations {
-    /// Asks about each configuration on the calling thread, or about all on all cores, and lets `write` write the answers to `out`.
-    ///
-    /// # Safety
-    /// As for `array`.
-    unsafe fn ask<O, T>(
-        &self,
-        out: impl FnOnce() -> Result<O, Failure>,
-        one: impl Fn(&mut Robot, &[f64]) -> Result<T, RobotError>,
-        all: impl FnOnce(&mut Robot, &[f64]) -> Result<Vec<T>, RobotError>,
-        write: impl FnOnce(O, &Robot, Vec<T>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
-        let Self(robot, rows) = self;
-        ask(*robot, |own, parallel| {
-            // SAFETY: the caller vouches for it.
-            let numbers = unsafe { rows.configurations(own) }?;
-            let out = out()?;
-            let found = if parallel && !numbers.is_empty() {
-                all(own, &numbers)?
-            } else {
-                let mut found = Vec::new();
-                reserve("answers", rows.count, &mut found)?;
-                for (row, joints) in rows.of(&numbers).enumerate() {
-                    found.push(one(own, joints).map_err(rows.at(row))?);
-                }
-                found
-            };
-            write(out, own, found)
-        })
-    }
-
-    /// Asks for an answer about each.
-    ///
-    /// # Safety
-    /// As for `array` and `Room::new`.
-    unsafe fn each<T, R: Copy>(
-        self,
-        answers: *mut R,
-        one: impl Fn(&mut Robot, &[f64]) -> Result<T, RobotError>,
-        all: impl FnOnce(&mut Robot, &[f64]) -> Result<Vec<T>, RobotError>,
-        row: impl Fn(&Robot, T) -> R,
-    ) -> i32 {
-        // SAFETY: the caller vouches for it.
-        entry(|| unsafe {
-            let room = || Room::new("answers", answers, self.1.count);
-            self.ask(room, one, all, |mut room, own, found| {
-                room.fill(found.into_iter().map(Ok::<_, Failure>), |found| row(own, found))
-            })
-        })
-    }
-}
-
-/// Returns a question about configurations.
-fn configurations(robot: RobotHandle, numbers: *const f64, joints: usize, count: usize) -> Configurations {
-    Configurations(robot, Rows { name: "joints", numbers, joints, per_joint: 1, count })
-}
-
-questions! {
-    (robot: RobotHandle, joints: *const f64, joint_count: usize, count: usize,)
-        => configurations(robot, joints, joint_count, count);
-    cbvh_robot_collide() -> bool:
-        |robot, joints| robot.collide(joints), |robot, joints| robot.collide_many(joints), |_, answer| answer;
-    cbvh_robot_distances() -> RobotDistanceRow:
-        |robot, joints| robot.distance(joints), |robot, joints| robot.distance_many(joints), distance;
-}
-
-/// Makes the row of the nearest bodies. Its points are in the world.
-fn distance(robot: &Robot, of: Option<RobotDistance>) -> RobotDistanceRow {
-    let Some(RobotDistance { bodies, mut nearest, points: [point_a, point_b], .. }) = of else {
-        return input::Plain::NONE;
-    };
-    (nearest.point_a, nearest.point_b) = (point_a, point_b);
-    RobotDistanceRow { pair: numbered(robot, &bodies), nearest: nearest.into(), found: 1, reserved: 0 }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_robot_pairs_in_contact(
-    robot: RobotHandle,
-    joints: *const f64,
-    joint_count: usize,
-    count: usize,
-    counts: *mut usize,
-    pairs: *mut BodyPairRow,
-    capacity: usize,
-    pair_count: *mut usize,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    entry(|| unsafe {
-        configurations(robot, joints, joint_count, count).ask(
-            || Lists::new(("pairs", pairs, capacity, pair_count), counts, count),
-            |robot, joints| robot.pairs_in_contact(joints),
-            |robot, joints| robot.pairs_in_contact_many(joints),
-            |lists, own, found| {
-                let rows = |pairs: &Vec<_>| Ok(pairs.iter().map(|pair| numbered(own, pair)).collect());
-                lists.finish_with::<BodyPairRow, Failure>(found.iter().map(rows))
-            },
-        )
-    })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_robot_link_poses(
-    robot: RobotHandle,
-    joints: *const f64,
-    joint_count: usize,
-    count: usize,
-    poses: *mut PoseRows,
-    capacity: usize,
-    pose_count: *mut usize,
-) -> i32 {
-    let of = |robot: &mut Robot, joints: &[f64]| robot.link_poses(joints);
-    // SAFETY: the header asks for it.
-    entry(|| unsafe {
-        configurations(robot, joints, joint_count, count).ask(
-            || List::new("poses", poses, capacity, pose_count),
-            of,
-            |robot, all| all.chunks(joint_count).map(|joints| of(robot, joints)).collect(),
-            |mut list, _, found| {
-                list.add(found.iter().flatten());
-                list.finish()
-            },
-        )
-    })
-}
-
-/// A question about motions.
-struct Motions<R>(RobotHandle, *const MotionChoices, usize, R);
-
-impl<R: FnOnce(&Robot) -> Result<Vec<Edge>, Failure>> Motions<R> {
-    /// Asks about each motion.
-    ///
-    /// # Safety
-    /// As for `options` and `Room::new`.
-    unsafe fn each<T, A: Copy>(
-        self,
-        answers: *mut A,
-        one: impl Fn(&mut Robot, &Edge, &MotionOptions) -> Result<T, RobotError>,
-        all: impl FnOnce(&mut Robot, &[Edge], &MotionOptions) -> Result<Vec<T>, RobotError>,
-        row: impl Fn(&Robot, T) -> A,
-    ) -> i32 {
-        let Self(robot, choices, count, read) = self;
-        let asked = |own: &mut Robot, parallel: bool| {
-            let edges = read(own)?;
-            // SAFETY: the caller vouches for it.
-            let (options, mut room) = unsafe {
-                (input::options("options", choices)?.read(), Room::new("answers", answers, count)?)
-            };
-            let found = if parallel {
-                all(own, &edges, &options)?
-            } else {
-                edges.iter().map(|edge| one(own, edge, &options)).collect::<Result<_, _>>()?
-            };
-            room.fill(found.into_iter().map(Ok::<_, Failure>), |found| row(own, found))
-        };
-        entry(|| ask(robot, asked))
-    }
-}
-
-/// Makes motions straight from one configuration to another each.
-///
-/// # Safety
-/// As for `array`.
-unsafe fn straight(robot: &Robot, starts: &Rows, ends: &Rows) -> Result<Vec<Edge>, Failure> {
-    // SAFETY: the caller vouches for it.
-    let (from, to) = unsafe { (starts.configurations(robot)?, ends.configurations(robot)?) };
-    let mut edges = Vec::new();
-    reserve(starts.name, starts.count, &mut edges)?;
-    for (row, (from, to)) in starts.of(&from).zip(ends.of(&to)).enumerate() {
-        edges.push(Edge::straight(from, to).map_err(starts.at(row))?);
-    }
-    Ok(edges)
-}
-
-/// Makes motions on which each joint value follows a polynomial.
-///
-/// # Safety
-/// As for `array`.
-unsafe fn polynomials(robot: &Robot, rows: &Rows) -> Result<Vec<Edge>, Failure> {
-    if rows.per_joint == 0 {
-        return Err(Failure::argument("coefficient_count", "at least 1", 0));
-    }
-    // SAFETY: the caller vouches for it.
-    let numbers = unsafe { rows.read(robot) }?;
-    let mut edges = Vec::new();
-    reserve(rows.name, rows.count, &mut edges)?;
-    for (row, of) in rows.of(&numbers).enumerate() {
-        let edge = Edge::polynomials(of.chunks(rows.per_joint).map(<[f64]>::to_vec).collect());
-        robot.check_edge(&edge).map_err(rows.at(row))?;
-        edges.push(edge);
-    }
-    Ok(edges)
-}
-
-questions! {
-    (robot: RobotHandle, starts: *const f64, ends: *const f64, joint_count: usize, count: usize,
-        options: *const MotionChoices,)
-        => Motions(robot, options, count, |robot: &Robot| {
-            let rows = |name, numbers| Rows { name, numbers, joints: joint_count, per_joint: 1, count };
-            straight(robot, &rows("starts", starts), &rows("ends", ends))
-        });
-    cbvh_robot_edges_are_free() -> bool:
-        |robot, edge, options| robot.is_edge_free(edge, options),
-        |robot, edges, options| robot.are_free(edges, options), |_, answer| answer;
-    cbvh_robot_edge_motions() -> RobotMotionRow:
-        |robot, edge, options| robot.motion(edge, options),
-        |robot, edges, options| robot.motions(edges, options), motion;
-}
-
-questions! {
-    (robot: RobotHandle, coefficients: *const f64, coefficient_count: usize, joint_count: usize, count: usize,
-        options: *const MotionChoices,)
-        => Motions(robot, options, count, |robot: &Robot| {
-            let (name, per_joint) = ("coefficients", coefficient_count);
-            polynomials(robot, &Rows { name, numbers: coefficients, joints: joint_count, per_joint, count })
-        });
-    cbvh_robot_are_free() -> bool:
-        |robot, edge, options| robot.is_edge_free(edge, options),
-        |robot, edges, options| robot.are_free(edges, options), |_, answer| answer;
-    cbvh_robot_motions() -> RobotMotionRow:
-        |robot, edge, options| robot.motion(edge, options),
-        |robot, edges, options| robot.motions(edges, options), motion;
-}
-
-/// Makes the row of a motion. Its points are in the world.
-fn motion(robot: &Robot, of: RobotMotion) -> RobotMotionRow {
-    let (outcome, free_until, at, bodies, mut nearest, points) = match of {
-        RobotMotion::Hit { free_until, touching_at, bodies, nearest, points, .. } => {
-            (HIT, free_until, touching_at, bodies, nearest, points)
-        }
-        RobotMotion::Near { free_until, at, bodies, nearest, points, .. } => {
-            (NEAR, free_until, at, bodies, nearest, points)
-        }
-        _ => return RobotMotionRow { outcome: FREE, free_until: 1.0, ..input::Plain::NONE },
-    };
-    [nearest.point_a, nearest.point_b] = points;
-    let (pair, reserved) = (numbered(robot, &bodies), 0);
-    RobotMotionRow { outcome, reserved, free_until, at, pair, nearest: nearest.into() }
 }
