@@ -78,6 +78,13 @@ impl Asker {
         self.querier.collide(a, b, &pose).map_err(|source| failed(setting, pair, source))
     }
 
+    /// Returns how far apart a pair is.
+    pub(crate) fn distance(&mut self, setting: &Setting, pair: &Pair) -> Result<Distance, RobotError> {
+        let pose = self.pose(setting, pair)?;
+        let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
+        self.querier.distance(a, b, &pose).map_err(|source| failed(setting, pair, source))
+    }
+
     /// Returns whether any pair touches.
     pub(crate) fn collide(&mut self, setting: &Setting, joints: &[f64]) -> Result<bool, RobotError> {
         self.place(setting, joints)?;

@@ -70,6 +70,12 @@ impl Frame {
         })
     }
 
+    /// Returns where a point of the world is in the body's frame.
+    pub(crate) fn find(&self, point: Point) -> Point {
+        let way = [0, 1, 2].map(|k| point[k] - self.translation[k]);
+        [0, 1, 2].map(|k| (0..3).map(|row| self.rotation[row][k] * way[row]).sum())
+    }
+
     /// Returns the frame as a pose.
     pub(crate) fn pose(&self) -> Result<Pose, PoseError> {
         Pose::new(self.rotation, self.translation)

@@ -42,9 +42,10 @@ pub(crate) struct Joint {
 
 /// How a joint moves its child.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "nearly all joints turn")]
 pub(crate) enum Kind {
     /// About an axis, by an angle in radians: see [`Kind::turn`].
-    Turn { by: Value, turns: [[[f64; 3]; 3]; 3] },
+    Turn { by: Value, axis: Point, turns: [[[f64; 3]; 3]; 3] },
     /// Along a unit axis, by a length.
     Slide { by: Value, axis: Point },
     /// By x, y and an angle about z: the numbers from this one on.
@@ -73,7 +74,7 @@ impl Kind {
         let [x, y, z] = axis;
         let across = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
         let first = product(&origin.rotation, &across);
-        Self::Turn { by, turns: [origin.rotation, first, product(&first, &across)] }
+        Self::Turn { by, axis, turns: [origin.rotation, first, product(&first, &across)] }
     }
 }
 
@@ -121,18 +122,16 @@ impl Model {
         std::iter::successors(self.groups[group], |&joint| self.groups[self.joints[joint].parent])
     }
 
-    /// Returns the joints that lead from one group to another: up from `a` to the first common one, and down from there to `b`.
-    /// The root is where the world is.
+    /// Returns the joints between two groups. The root is where the world is.
     pub(crate) fn chain(&self, a: usize, b: usize) -> Chain {
-        let [mut up, mut down] = [a, b].map(|group| self.above(group).collect::<Vec<_>>());
-        while let (Some(x), Some(y)) = (up.last(), down.last())
+        let [mut a, mut b] = [a, b].map(|group| self.above(group).collect::<Vec<_>>());
+        while let (Some(x), Some(y)) = (a.last(), b.last())
             && x == y
         {
-            up.pop();
-            down.pop();
+            a.pop();
+            b.pop();
         }
-        down.reverse();
-        Chain { up, down }
+        Chain { a, b }
     }
 
     /// Returns the number of a link.
@@ -145,13 +144,11 @@ impl Model {
     }
 }
 
-/// The joints between two groups.
+/// The joints between two groups: from each of them up to the first common one.
 #[derive(Debug)]
 pub(crate) struct Chain {
-    /// From the first group up.
-    pub(crate) up: Vec<usize>,
-    /// Down to the second group.
-    pub(crate) down: Vec<usize>,
+    pub(crate) a: Vec<usize>,
+    pub(crate) b: Vec<usize>,
 }
 
 impl Joint {
