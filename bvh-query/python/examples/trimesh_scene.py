@@ -1,6 +1,6 @@
 """A scene of trimesh in cbvh: each geometry is baked once, however often it is placed.
 
-    pip install trimesh networkx
+    pip install trimesh networkx scipy
     python examples/trimesh_scene.py
 
 Nodes of the graph are instances, with the names and poses that they have there. Scenes come from glTF, COLLADA and others.
