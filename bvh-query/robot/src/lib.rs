@@ -11,6 +11,7 @@
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
 
 mod asker;
+mod collada;
 mod edge;
 mod error;
 mod frame;

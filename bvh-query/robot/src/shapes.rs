@@ -1,5 +1,6 @@
 //! Makes the shapes of links: meshes from files, baked once for each content and scale, and primitives.
 
+use crate::collada;
 use crate::error::RobotError;
 use crate::frame::Point;
 use crate::packages::find;
@@ -100,7 +101,8 @@ impl<'a> Shapes<'a> {
         };
         let is_collada = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dae"));
         let mut mesh = if is_collada {
-            collada(content).map_err(|found| description("a COLLADA file", found))?
+            let text = std::str::from_utf8(content).map_err(|error| error.to_string());
+            text.and_then(collada::read).map_err(|found| description("a COLLADA file", found))?
         } else {
             read_meshes(&[path.to_owned()]).map_err(refused)?.merged()
         };
@@ -138,17 +140,4 @@ fn rescale(mesh: &mut Mesh, scale: Point) {
             object.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
     }
-}
-
-/// Reads the triangles of a COLLADA file in metres, with the transforms of its scene. The axis that points up does not matter,
-/// as in ROS.
-fn collada(content: &[u8]) -> Result<Mesh, String> {
-    let scene = mesh_loader::collada::from_slice(content).map_err(|error| error.to_string())?;
-    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    for mesh in scene.meshes {
-        let first = positions.len() as u32;
-        positions.extend(mesh.vertices.iter().map(|vertex| vertex.map(f64::from)));
-        triangles.extend(mesh.faces.iter().map(|face| face.map(|corner| first + corner)));
-    }
-    Ok(Mesh::from_triangles(positions, triangles))
 }
