@@ -2,8 +2,8 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point};
-use crate::robot::{Pair, Setting};
-use bvh_query::{BackendError, Distance, Pose, Querier, QueryError};
+use crate::robot::{Pair, Part, Setting};
+use bvh_query::{BackendError, Distance, Querier, QueryError};
 
 /// A querier, and where everything is in the configuration in question.
 pub(crate) struct Asker {
@@ -12,6 +12,8 @@ pub(crate) struct Asker {
     groups: Vec<Frame>,
     /// The middles of the balls around the parts, in the world.
     centres: Vec<Point>,
+    /// More than the roundings of these places.
+    slack: f64,
     /// The pair that touched last. It is likely to touch again.
     likely: usize,
 }
@@ -35,7 +37,7 @@ impl Asker {
     }
 
     fn with(querier: Querier) -> Self {
-        Self { querier, groups: Vec::new(), centres: Vec::new(), likely: usize::MAX }
+        Self { querier, groups: Vec::new(), centres: Vec::new(), slack: 0.0, likely: usize::MAX }
     }
 
     /// Goes to a configuration.
@@ -45,14 +47,16 @@ impl Asker {
         self.centres.clear();
         let groups = &self.groups;
         self.centres.extend(setting.parts.iter().map(|part| groups[part.group].place(part.centre)));
+        let places = self.centres.iter().chain(groups.iter().map(|group| &group.translation));
+        let farthest = places.flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+        self.slack = ROUNDING * farthest;
         Ok(())
     }
 
-    /// Returns how far apart the balls around both parts are; negative where they meet.
-    #[inline]
+    /// Returns how far apart the balls around both parts are at least; negative where they meet.
     fn gap(&self, pair: &Pair) -> f64 {
         let squared = squared_distance(&self.centres[pair.a], &self.centres[pair.b]);
-        squared.sqrt() - pair.reach
+        squared.sqrt() - pair.reach - self.slack
     }
 
     /// Returns the frame of a part in the world.
@@ -61,26 +65,35 @@ impl Asker {
         self.groups[part.group].of(&part.origin)
     }
 
-    /// Returns the pose of B in A's frame.
-    fn pose(&self, setting: &Setting, pair: &Pair) -> Result<Pose, RobotError> {
-        let relative = self.frame(setting, pair.a).relative(&self.frame(setting, pair.b));
-        Ok(relative.pose()?)
+    /// Returns the frame of B in A's.
+    fn relative(&self, setting: &Setting, pair: &Pair) -> Frame {
+        self.frame(setting, pair.a).relative(&self.frame(setting, pair.b))
     }
 
+    #[inline]
     fn touches(&mut self, setting: &Setting, number: usize) -> Result<bool, RobotError> {
         let pair = &setting.pairs[number];
-        let squared = squared_distance(&self.centres[pair.a], &self.centres[pair.b]);
-        if squared > pair.reach * pair.reach {
+        let reach = pair.reach + self.slack;
+        if squared_distance(&self.centres[pair.a], &self.centres[pair.b]) > reach * reach {
             return Ok(false);
         }
-        let pose = self.pose(setting, pair)?;
-        let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
-        self.querier.collide(a, b, &pose).map_err(|source| failed(setting, pair, source))
+        self.shapes_touch(setting, pair)
+    }
+
+    #[inline(never)]
+    fn shapes_touch(&mut self, setting: &Setting, pair: &Pair) -> Result<bool, RobotError> {
+        let relative = self.relative(setting, pair);
+        let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part]);
+        if boxes_apart(&relative, a, b, self.slack) {
+            return Ok(false);
+        }
+        let pose = relative.pose()?;
+        self.querier.collide(&a.shape, &b.shape, &pose).map_err(|source| failed(setting, pair, source))
     }
 
     /// Returns how far apart a pair is.
     pub(crate) fn distance(&mut self, setting: &Setting, pair: &Pair) -> Result<Distance, RobotError> {
-        let pose = self.pose(setting, pair)?;
+        let pose = self.relative(setting, pair).pose()?;
         let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
         self.querier.distance(a, b, &pose).map_err(|source| failed(setting, pair, source))
     }
@@ -132,7 +145,7 @@ impl Asker {
             }
             let pair = &setting.pairs[number];
             let failed = |source| failed(setting, pair, source);
-            let pose = self.pose(setting, pair)?;
+            let pose = self.relative(setting, pair).pose()?;
             let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
             if limit.is_finite() && !self.querier.within(a, b, &pose, limit).map_err(failed)? {
                 continue;
@@ -164,7 +177,67 @@ pub(crate) fn failed(setting: &Setting, pair: &Pair, source: QueryError) -> Robo
     RobotError::Pair { a, b, source }
 }
 
+/// More than what a chain of a hundred joints rounds, as a part of how far it is from the origin.
+const ROUNDING: f64 = 1.0 / (1u64 << 42) as f64;
+
+/// Returns whether the boxes around two parts are apart along an axis of one, or along one that is across an axis of each (Gottschalk,
+/// Lin, Manocha, SIGGRAPH 1996).
+fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
+    let middle = b_in_a.place(b.middle_of_box);
+    let way = [0, 1, 2].map(|k| middle[k] - a.middle_of_box[k]);
+    let (turn, half_a, half_b) = (&b_in_a.rotation, &a.half, &b.half);
+    let size = half_a.iter().chain(half_b).chain(&a.middle_of_box).chain(&b.middle_of_box);
+    let slack = slack + ROUNDING * size.map(|x| x.abs()).sum::<f64>();
+    let steep = turn.map(|row| row.map(|x| x.abs() + ROUNDING));
+    let on_a =
+        |i: usize| way[i].abs() > half_a[i] + (0..3).map(|j| steep[i][j] * half_b[j]).sum::<f64>() + slack;
+    let on_b = |j: usize| {
+        let along: f64 = (0..3).map(|i| turn[i][j] * way[i]).sum();
+        along.abs() > half_b[j] + (0..3).map(|i| steep[i][j] * half_a[i]).sum::<f64>() + slack
+    };
+    let across = |i: usize, j: usize| {
+        let [(p, q), (s, t)] = [i, j].map(|k| ((k + 1) % 3, (k + 2) % 3));
+        let reach_a = half_a[p] * steep[q][j] + half_a[q] * steep[p][j];
+        let reach_b = half_b[s] * steep[i][t] + half_b[t] * steep[i][s];
+        (way[q] * turn[p][j] - way[p] * turn[q][j]).abs() > reach_a + reach_b + slack
+    };
+    (0..3).any(on_a) || (0..3).any(on_b) || (0..9).any(|axes| across(axes / 3, axes % 3))
+}
+
 fn squared_distance(a: &Point, b: &Point) -> f64 {
     let way = [0, 1, 2].map(|k| b[k] - a[k]);
     way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bvh_bake::{Options, shapes, to_bytes};
+    use bvh_query::{Bvh, OwnedShape};
+    use cbvh_testkit::Random;
+
+    /// Boxes are apart where solid boxes do not touch, unless they nearly do.
+    #[test]
+    fn boxes_are_apart_where_they_do_not_touch() {
+        let random = &mut Random::new(7);
+        let part = |_| {
+            let sides = [(); 3].map(|()| 0.05 + random.unit());
+            let (bytes, _) = to_bytes(&shapes::block(sides).unwrap(), &Options::default()).unwrap();
+            let shape = OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).solid().unwrap();
+            Part::new(0, (0, false), Frame::IDENTITY, shape, 0.0).unwrap()
+        };
+        let parts: Vec<Part> = (0..24).map(part).collect();
+        let (mut querier, mut apart) = (Querier::new().unwrap(), 0);
+        for round in 0..2000 {
+            let [a, b] = [(); 2].map(|()| &parts[random.below(parts.len())]);
+            let frame = Frame::from_quaternion(random.quaternion(), random.point().map(|x| 0.8 * x));
+            let pose = frame.pose().unwrap();
+            let distance = querier.distance(&a.shape, &b.shape, &pose).unwrap().distance;
+            let is_apart = boxes_apart(&frame, a, b, 0.0);
+            assert!(!is_apart || distance > 0.0, "round {round}: {distance}");
+            assert!(is_apart || distance < 1e-9, "round {round}: {distance}");
+            apart += u32::from(is_apart);
+        }
+        assert!((500..1500).contains(&apart), "{apart}");
+    }
 }

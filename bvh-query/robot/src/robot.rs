@@ -91,10 +91,13 @@ pub(crate) struct Part {
     pub(crate) middle: Point,
     pub(crate) centre: Point,
     pub(crate) radius: f64,
+    /// The middle of the box around it, in its own frame, and half of the box's sides.
+    pub(crate) middle_of_box: Point,
+    pub(crate) half: Point,
 }
 
 impl Part {
-    fn new(
+    pub(crate) fn new(
         body: usize,
         (group, is_still): (usize, bool),
         origin: Frame,
@@ -102,13 +105,15 @@ impl Part {
         margin: f64,
     ) -> Result<Self, RobotError> {
         let shape = bare.clone().rounded(bare.shape().radius() + margin)?;
+        let (middle_of_box, half) = bounds(shape.shape());
         let (middle, radius) = ball(shape.shape());
-        Ok(Self { body, group, is_still, origin, middle, centre: origin.place(middle), shape, bare, radius })
+        let centre = origin.place(middle);
+        Ok(Self { body, group, is_still, origin, shape, bare, middle, centre, radius, middle_of_box, half })
     }
 }
 
-/// Returns a ball around a shape, in the shape's frame.
-fn ball(shape: Shape<'_>) -> (Point, f64) {
+/// Returns the middle of the box around a shape, and half of its sides.
+fn bounds(shape: Shape<'_>) -> (Point, Point) {
     let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for object in shape.objects() {
         let [low, high] = object.bounding_box();
@@ -116,16 +121,20 @@ fn ball(shape: Shape<'_>) -> (Point, f64) {
             (lo[k], hi[k]) = (lo[k].min(low[k]), hi[k].max(high[k]));
         }
     }
-    let centre = [0, 1, 2].map(|k| lo[k] + (hi[k] - lo[k]) / 2.0);
-    let mut radius = length([0, 1, 2].map(|k| (hi[k] - lo[k]) / 2.0));
-    if let [object] = shape.objects() {
-        let (middle, tight) = object.bounding_sphere();
-        if tight < radius {
-            return (middle, (tight + shape.radius()) * ROUNDED_UP);
-        }
-    }
-    radius = (radius + shape.radius()) * ROUNDED_UP;
-    (centre, radius)
+    let half = [0, 1, 2].map(|k| ((hi[k] - lo[k]) / 2.0 + shape.radius()) * ROUNDED_UP);
+    ([0, 1, 2].map(|k| lo[k] + (hi[k] - lo[k]) / 2.0), half)
+}
+
+/// Returns a ball around a shape, in the shape's frame.
+fn ball(shape: Shape<'_>) -> (Point, f64) {
+    let (middle, half) = bounds(shape);
+    let corner = length(half.map(|half| half - shape.radius()));
+    let tight = match shape.objects() {
+        [object] => Some(object.bounding_sphere()).filter(|(_, tight)| *tight < corner),
+        _ => None,
+    };
+    let (middle, radius) = tight.unwrap_or((middle, corner));
+    (middle, (radius + shape.radius()) * ROUNDED_UP)
 }
 
 /// More than all roundings of a ball's middle and radius.
