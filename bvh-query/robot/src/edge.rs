@@ -225,6 +225,10 @@ impl Robot {
 
     /// Returns whether a motion is free, and otherwise what touches first, and when.
     ///
+    /// Cost: that of [`Robot::is_edge_free`], and of [`Querier::motion`](bvh_query::Querier::motion) for each pair that is not free. Links
+    /// that slide along each other, less than the tolerance apart, take long, since each moment is undecided: allow their contact, or
+    /// give a larger tolerance.
+    ///
     /// # Errors
     /// The errors of [`Robot::is_free`].
     pub fn motion(&mut self, edge: &Edge, options: &MotionOptions) -> Result<RobotMotion, RobotError> {
