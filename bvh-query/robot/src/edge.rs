@@ -177,7 +177,7 @@ impl Robot {
     /// given ([`MotionOptions::tolerance`]).
     ///
     /// Cost: that of [`Querier::is_free`](bvh_query::Querier::is_free) for each pair that may come near on the way, until one is
-    /// not free.
+    /// not free. It grows with the number of turns, and turns of more than 16,384 radians are refused.
     ///
     /// # Errors
     /// The errors of [`Robot::collide`].
@@ -214,8 +214,8 @@ impl Robot {
         edges.par_iter().map_init(|| asker.clone(), ask).collect::<Vec<_>>().into_iter().collect()
     }
 
-    /// Returns an error unless a motion is one of this robot: with a polynomial for each joint value, and valid ends. A quaternion's
-    /// polynomials are straight.
+    /// Returns an error unless a motion is one of this robot: with a polynomial for each joint value, valid ends, and turns at no more
+    /// than 16,384 radians per motion. A quaternion's polynomials are straight.
     ///
     /// # Errors
     /// [`RobotError::Count`] and [`RobotError::Value`].
@@ -308,6 +308,7 @@ impl Asker {
         let limit =
             options.clearance + options.tolerance.unwrap_or(DEFAULT_TOLERANCE * a.radius.max(b.radius));
         let mut todo = VecDeque::from([[0.0, 1.0]]);
+        let mut halved = 0;
         while let Some([t0, t1]) = todo.pop_front() {
             let (middle, bound) = path.follow(b.middle, b.radius, [t0, t1]);
             let moved = (bound.speed * (t1 - t0) / 2.0 + bound.rounding) * ROUNDED_UP + limit;
@@ -321,6 +322,10 @@ impl Asker {
                 let is_near =
                     moved > size || self.querier.within(&a.shape, &b.shape, &path.pose(at), moved)?;
                 if is_near {
+                    halved += 1;
+                    if halved == MOST_HALVED {
+                        return self.querier.is_free(&a.shape, &b.shape, path, options);
+                    }
                     todo.extend([[t0, at], [at, t1]]);
                 }
             } else if !self.querier.is_free(
@@ -388,6 +393,12 @@ fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
         model.check(&numbers)?;
     }
     for joint in &model.joints {
+        let [turn, _] = parts_of(&joint.kind, edge);
+        // NaN is not within anything.
+        if !(turn.rate <= MAX_TURN) {
+            let (joint, expected) = (joint.name.clone(), "a turn at no more than 16,384 radians per motion");
+            return Err(RobotError::Value { joint, expected, found: turn.rate });
+        }
         if let Kind::Floating(first) = joint.kind
             && let Some(found) = edge.coefficients[first + 3..first + 7].iter().find(|of| of.len() > 2)
         {
@@ -490,6 +501,11 @@ impl<'a> PairPath<'a> {
 
 /// On an interval, paths that bend by no more than this part of their length are left to [`Querier`](bvh_query::Querier).
 const LITTLE_BENT: f64 = 0.25;
+/// The fastest turn of a joint, in radians per motion. What a motion costs is proportional to it.
+const MAX_TURN: f64 = 16384.0;
+/// The most intervals that are halved before all of the motion is left to the querier, which keeps fewer
+/// intervals in memory.
+const MOST_HALVED: u32 = 1 << 12;
 /// More than what [`MotionOptions`] takes for a tolerance, as a part of the radius of the larger ball.
 const DEFAULT_TOLERANCE: f64 = 4e-6;
 /// 64 u: see above.

@@ -107,6 +107,12 @@ fn numbers_that_no_joint_can_have_are_refused() {
     let mut slide = slide.unwrap();
     assert!(slide.is_free(&[3.0], &[1e6]).unwrap() && !slide.is_free(&[0.0], &[1e6]).unwrap());
     assert!(matches!(slide.is_free(&[3.0], &[1e40]), Err(RobotError::Pose(_))));
+    // Many turns take their time, and too many are refused.
+    for radians in [1e3, 1.6e4, 1.7e4, 1e12, 1e308] {
+        let answer = two_balls().is_free(&[0.0], &[radians]);
+        let is_refused = matches!(answer, Err(RobotError::Value { .. }));
+        assert!(is_refused && radians > 16384.0 || answer.is_ok(), "{radians}: {answer:?}");
+    }
     // Also if no pair comes near.
     robot.add_obstacle("o", robot_shape(), &Pose::IDENTITY).unwrap();
     robot
@@ -130,6 +136,18 @@ fn numbers_that_no_joint_can_have_are_refused() {
         assert!(matches!(result, Err(RobotError::Unknown { .. })));
     }
     assert!(robot.attach("t", robot_shape(), "nothing", &Pose::IDENTITY, &[]).is_err());
+}
+
+/// A ball that passes another one once in a turn, with a gap.
+fn two_balls() -> Robot {
+    let ball = |at: f64| {
+        format!(
+            "<collision><origin xyz=\"{at} 0 0\"/><geometry><sphere radius=\"1\"/></geometry></collision>"
+        )
+    };
+    let joint = JOINT.replace("</joint>", "<axis xyz=\"0 0 1\"/></joint>");
+    let (a, b) = (ball(6.0), ball(3.0));
+    read(&format!("<robot><link name=\"a\">{a}</link><link name=\"b\">{b}</link>{joint}</robot>")).unwrap()
 }
 
 fn robot_shape() -> bvh_query::OwnedShape {
