@@ -14,15 +14,20 @@ const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0,
 
 /// Nodes that are deeper are in a circle.
 const MAX_DEPTH: usize = 64;
-/// Nodes may name nodes again and again, so that a small file could have any number of triangles.
-const MAX_TRIANGLES: usize = 1 << 28;
+/// The most inputs of a corner: a position, a normal, some colours and textures.
+const MAX_INPUTS: usize = 1024;
+/// Nodes may name nodes and meshes again and again, so that a small file could have any number of triangles: what is read counts each
+/// time, by nodes and by numbers.
+const MAX_READ: usize = 1 << 27;
+/// What a node counts: it is more work than a number, and a file has few.
+const STEPS_PER_NODE: usize = 1 << 10;
 
 /// Reads a file, or says what is wrong with it.
 pub(crate) fn read(text: &str) -> Result<Mesh, String> {
     let document = Document::parse(text).map_err(|error| error.to_string())?;
     let of_id: HashMap<&str, Node<'_, '_>> =
         document.descendants().filter_map(|node| Some((node.attribute("id")?, node))).collect();
-    let mut reader = Reader { of_id, positions: Vec::new(), triangles: Vec::new() };
+    let mut reader = Reader { of_id, positions: Vec::new(), triangles: Vec::new(), read: 0 };
     let root = document.root_element();
     let unit = root.descendants().find(|node| node.has_tag_name("unit"));
     let metres = unit.and_then(|unit| unit.attribute("meter")).map_or(Ok(1.0), number)?;
@@ -45,6 +50,7 @@ struct Reader<'a, 'n> {
     of_id: HashMap<&'n str, Node<'n, 'a>>,
     positions: Vec<Point>,
     triangles: Vec<[u32; 3]>,
+    read: usize,
 }
 
 impl<'a, 'n> Reader<'a, 'n> {
@@ -55,11 +61,18 @@ impl<'a, 'n> Reader<'a, 'n> {
         found.ok_or_else(|| format!("<{}> of '{url}', which is not there", node.tag_name().name()))
     }
 
+    /// Counts what is read.
+    fn count(&mut self, of: usize) -> Result<(), String> {
+        self.read = self.read.saturating_add(of);
+        if self.read > MAX_READ { Err(format!("more than {MAX_READ} nodes and numbers")) } else { Ok(()) }
+    }
+
     /// Reads all that is in a node or in a scene.
     fn nodes(&mut self, node: Node<'n, 'a>, outer: &Affine, depth: usize) -> Result<(), String> {
         if depth > MAX_DEPTH {
             return Err("nodes in a circle".to_owned());
         }
+        self.count(STEPS_PER_NODE)?;
         let mut here = *outer;
         for child in node.children().filter(Node::is_element) {
             match child.tag_name().name() {
@@ -98,7 +111,10 @@ impl<'a, 'n> Reader<'a, 'n> {
                 continue;
             }
             let inputs = || primitive.children().filter(|node| node.has_tag_name("input"));
-            let offset = |input: Node<'_, '_>| input.attribute("offset").map_or(Ok(0), index);
+            let offset = |input: Node<'_, '_>| match input.attribute("offset").map_or(Ok(0), index)? {
+                offset if offset < MAX_INPUTS => Ok(offset),
+                offset => Err(format!("an input at offset {offset}")),
+            };
             let Some(input) = inputs().find(|input| input.attribute("semantic") == Some("VERTEX")) else {
                 return Err(format!("<{kind}> without vertices"));
             };
@@ -115,27 +131,26 @@ impl<'a, 'n> Reader<'a, 'n> {
                     known
                 }
             };
-            let corners = |list: Node<'_, '_>| -> Result<Vec<u32>, String> {
-                let all: Result<Vec<usize>, String> =
-                    list.text().unwrap_or_default().split_whitespace().map(index).collect();
-                all?.chunks_exact(stride)
-                    .map(|corner| match corner[at] {
-                        place if place < count => Ok(first + place as u32),
-                        place => Err(format!("vertex {place} of {count}")),
-                    })
-                    .collect()
-            };
             let counts = primitive.children().find(|node| node.has_tag_name("vcount"));
             for list in primitive.children().filter(|node| node.has_tag_name("p")) {
-                let corners = corners(list)?;
+                let all: Result<Vec<usize>, String> =
+                    list.text().unwrap_or_default().split_whitespace().map(index).collect();
+                let all = all?;
+                self.count(all.len())?;
+                let corner = |corner: &[usize]| match corner[at] {
+                    place if place < count => Ok(first + place as u32),
+                    place => Err(format!("vertex {place} of {count}")),
+                };
+                let corners: Result<Vec<u32>, String> = all.chunks_exact(stride).map(corner).collect();
+                let corners = corners?;
                 match kind {
-                    "triangles" => self.add(corners.as_chunks::<3>().0.iter().copied(), is_mirrored)?,
+                    "triangles" => self.add(corners.as_chunks::<3>().0.iter().copied(), is_mirrored),
                     "tristrips" => {
                         let strip = corners.windows(3).enumerate();
                         let turned = strip.map(|(number, of)| {
                             if number % 2 == 0 { [of[0], of[1], of[2]] } else { [of[1], of[0], of[2]] }
                         });
-                        self.add(turned, is_mirrored)?;
+                        self.add(turned, is_mirrored);
                     }
                     "polylist" => {
                         let counts = counts.and_then(|counts| counts.text()).unwrap_or_default();
@@ -146,23 +161,19 @@ impl<'a, 'n> Reader<'a, 'n> {
                                 return Err("a polygon beyond the end of its list".to_owned());
                             }
                             let (polygon, others) = rest.split_at(count);
-                            self.add(fan(polygon), is_mirrored)?;
+                            self.add(fan(polygon), is_mirrored);
                             rest = others;
                         }
                     }
-                    _ => self.add(fan(&corners), is_mirrored)?,
+                    _ => self.add(fan(&corners), is_mirrored),
                 }
             }
         }
         Ok(())
     }
 
-    fn add(&mut self, triangles: impl Iterator<Item = [u32; 3]>, is_mirrored: bool) -> Result<(), String> {
+    fn add(&mut self, triangles: impl Iterator<Item = [u32; 3]>, is_mirrored: bool) {
         self.triangles.extend(triangles.map(|[a, b, c]| if is_mirrored { [a, c, b] } else { [a, b, c] }));
-        if self.triangles.len() > MAX_TRIANGLES {
-            return Err(format!("more than {MAX_TRIANGLES} triangles"));
-        }
-        Ok(())
     }
 
     /// Adds the vertices that an input names, and returns the first of them and their number.
@@ -183,12 +194,10 @@ impl<'a, 'n> Reader<'a, 'n> {
         let (stride, offset) = (of("stride", 3)?.max(3), of("offset", 0)?);
         let first = self.positions.len();
         let values = values?;
+        self.count(values.len())?;
         let rows = values.get(offset..).unwrap_or_default().chunks(stride).filter(|row| row.len() >= 3);
         self.positions
             .extend(rows.map(|row| place.map(|of| of[0] * row[0] + of[1] * row[1] + of[2] * row[2] + of[3])));
-        if self.positions.len() > 3 * MAX_TRIANGLES {
-            return Err(format!("more than {} vertices", 3 * MAX_TRIANGLES));
-        }
         Ok((first as u32, self.positions.len() - first))
     }
 }
@@ -307,7 +316,14 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         let polygon = |p: &str| format!("<polygons>{INPUT}<p>{p}</p></polygons>");
+        let twice = |number: usize| {
+            let next = format!("<instance_node url=\"#n{}\"/>", number + 1);
+            format!("<node id=\"n{number}\">{next}{next}</node>")
+        };
+        let again: String = (0..40).map(twice).collect::<String>() + "<node id=\"n40\"/>";
+        let far = "<polygons><input semantic=\"VERTEX\" source=\"#v\" offset=\"18446744073709551615\"/><p>0</p></polygons>";
         for (primitive, nodes, expected) in [
+            (far.to_owned(), HERE, "an input at offset 18446744073709551615"),
             (polygon("0 0 0 1 0 4"), HERE, "vertex 4 of 4"),
             (polygon("0 0 0 x 0 1"), HERE, "'x' in place of a whole number"),
             (
@@ -315,6 +331,7 @@ mod tests {
                 "<node><instance_geometry url=\"#h\"/></node>",
                 "'#h', which is not there",
             ),
+            (polygon("0 0 0 1 0 2"), &again, "nodes and numbers"),
             (
                 polygon("0 0 0 1 0 2"),
                 "<node id=\"n\"><instance_node url=\"#n\"/></node>",

@@ -5,7 +5,7 @@
 //!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
 //!                                                  ├──> questions about configurations (questions, asker)
-//!                                                  └──> motions in joint space, certain at every moment (edge)
+//!                                                  └──> motions, certain at every moment (motions, pair_path, edge)
 //! ```
 //!
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
@@ -16,7 +16,9 @@ mod edge;
 mod error;
 mod frame;
 mod model;
+mod motions;
 mod packages;
+mod pair_path;
 mod questions;
 mod robot;
 mod shapes;
@@ -26,8 +28,9 @@ mod testing;
 mod urdf;
 mod xml;
 
-pub use edge::{Edge, RobotMotion};
+pub use edge::Edge;
 pub use error::RobotError;
+pub use motions::RobotMotion;
 pub use questions::RobotDistance;
 pub use robot::{Base, Geometry, Robot, RobotOptions};
 pub use srdf::{Group, State};

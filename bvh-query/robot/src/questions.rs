@@ -5,6 +5,8 @@ use crate::error::RobotError;
 use crate::robot::{Robot, Setting};
 use bvh_query::Distance;
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::f64::consts::PI;
 
 /// The nearest two bodies.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,26 +118,32 @@ impl Robot {
         share: f64,
     ) -> Result<Vec<([String; 2], f64)>, RobotError> {
         let model = self.setting.model.clone();
+        if model.numbers.is_empty() {
+            return Ok(Vec::new());
+        }
         let mut state = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
-        let mut joints = Vec::with_capacity(samples * model.numbers.len());
-        for _ in 0..samples {
-            for [lower, upper] in &model.limits {
-                let [lower, upper] = if upper - lower < f64::INFINITY {
-                    [*lower, *upper]
-                } else {
-                    [-std::f64::consts::PI, std::f64::consts::PI]
-                };
+        let mut times: HashMap<[String; 2], usize> = HashMap::new();
+        let mut left = samples;
+        while left > 0 {
+            let some = left.min(SAMPLES_AT_ONCE);
+            left -= some;
+            let mut joints = Vec::new();
+            for [lower, upper] in (0..some).flat_map(|_| &model.limits) {
+                let is_limited = upper - lower < f64::INFINITY;
+                let [lower, upper] = if is_limited { [*lower, *upper] } else { [-PI, PI] };
                 joints.push(lower + (upper - lower) * random());
             }
+            for pair in self.pairs_in_contact_many(&joints)?.into_iter().flatten() {
+                *times.entry(pair).or_default() += 1;
+            }
         }
-        let touching = self.pairs_in_contact_many(&joints)?;
         let mut frequent = Vec::new();
         for pair in self.pairs() {
-            let times = touching.iter().filter(|pairs| pairs.contains(&pair)).count();
+            let times = times.get(&pair).copied().unwrap_or(0);
             let part = times as f64 / samples.max(1) as f64;
             if times > 0 && part >= share {
                 self.allow(&pair[0], &pair[1])?;
@@ -145,6 +153,9 @@ impl Robot {
         Ok(frequent)
     }
 }
+
+/// The random configurations that are in memory at a time.
+const SAMPLES_AT_ONCE: usize = 1024;
 
 /// Returns the names of the bodies of pairs of parts, each once.
 fn names(setting: &Setting, pairs: &[usize]) -> Vec<[String; 2]> {

@@ -9,7 +9,7 @@ use crate::model::{Kind, Link, Model, Value};
 use crate::robot::{Base, Geometry, RobotOptions};
 use crate::xml::{Description, child, children, text_of};
 use roxmltree::Node;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// The name of the joint between the world and a base that moves.
@@ -127,11 +127,14 @@ impl<'a> Urdf<'a> {
             group = model.add_joint(BASE, 0, Frame::IDENTITY, kind);
         }
         model.links.push(Link { name: links[first].to_owned(), group, origin: Frame::IDENTITY });
+        let mut below: Vec<Vec<&Found<'_, '_>>> = vec![Vec::new(); links.len()];
+        joints.iter().for_each(|joint| below[joint.parent].push(joint));
+        let by_name: HashMap<&str, &Found<'_, '_>> = joints.iter().map(|joint| (joint.name, joint)).collect();
         let mut next = vec![(first, group, Frame::IDENTITY)];
         while let Some((parent, group, place)) = next.pop() {
-            for joint in joints.iter().filter(|joint| joint.parent == parent) {
+            for joint in std::mem::take(&mut below[parent]) {
                 let origin = place.of(&self.origin(joint.node)?);
-                let (group, origin) = match self.kind(joint, &joints, &origin)? {
+                let (group, origin) = match self.kind(joint, &by_name, &origin)? {
                     Some(kind) => (model.add_joint(joint.name, group, origin, kind), Frame::IDENTITY),
                     None => (group, origin),
                 };
@@ -152,10 +155,10 @@ impl<'a> Urdf<'a> {
         model: &mut Model,
     ) -> Result<Vec<Found<'a, '_>>, RobotError> {
         let of = self.description;
-        let mut joints: Vec<Found<'_, '_>> = Vec::new();
+        let (mut joints, mut seen): (Vec<Found<'_, '_>>, HashSet<&str>) = Default::default();
         for node in children(of.root(), "joint") {
             let name = of.attribute(node, "name")?;
-            if joints.iter().any(|joint| joint.name == name) {
+            if !seen.insert(name) {
                 return Err(of.error(node, "a name of its own", "another joint that has it"));
             }
             let link = |which: &'static str| {
@@ -192,7 +195,7 @@ impl<'a> Urdf<'a> {
     fn kind(
         &self,
         joint: &Found<'_, '_>,
-        joints: &[Found<'_, '_>],
+        joints: &HashMap<&str, &Found<'_, '_>>,
         origin: &Frame,
     ) -> Result<Option<Kind>, RobotError> {
         let of = self.description;
@@ -214,7 +217,7 @@ impl<'a> Urdf<'a> {
             let [plus] = of.numbers(mimic, "offset")?.unwrap_or([0.0]);
             (offset, factor) = (offset + factor * plus, factor * times);
             let name = of.attribute(mimic, "joint")?;
-            let next = joints.iter().find(|other| other.name == name && other.is_single());
+            let next = joints.get(name).filter(|other| other.is_single());
             leader = next.ok_or_else(|| of.error(mimic, "a joint that turns or slides", name))?;
             steps += 1;
             if steps > joints.len() {

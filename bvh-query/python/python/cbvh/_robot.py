@@ -279,7 +279,8 @@ class Robot:
 
         False means that at some moment two bodies are within the clearance, or that their gap beyond it falls below the
         tolerance: a millionth of the size of the larger one, unless another one is given. A floating joint turns about one
-        axis, the shorter way. One row serves all rows of the other argument.
+        axis, the shorter way. One row serves all rows of the other argument. A joint that turns by more than 16,384 radians is
+        refused with ValueError.
         """
         (from_, one), (to, other) = self._rows(q0, "q0"), self._rows(q1, "q1")
         if len(from_) != len(to) and not (one or other):

@@ -1,0 +1,301 @@
+//! Questions about motions in joint space, certain at every moment.
+
+use crate::asker::{Asker, failed};
+use crate::edge::{Edge, at, parts_of, value};
+use crate::error::RobotError;
+use crate::frame::length;
+use crate::model::Kind;
+use crate::pair_path::{Interval, PairPath, ROUNDED_UP};
+use crate::questions::bodies;
+use crate::robot::{Robot, Setting};
+use bvh_query::{Distance, MotionAnswer, MotionOptions, QueryError, RigidPath};
+use rayon::prelude::*;
+use std::collections::VecDeque;
+
+/// Whether a motion in joint space is free.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum RobotMotion {
+    /// At no time from 0 to 1 is any pair within the clearance.
+    Free,
+    /// Two bodies are within the clearance at `touching_at`.
+    Hit {
+        /// Before this time certainly no pair is within the clearance.
+        free_until: f64,
+        /// A time at which the bodies are within the clearance: the earliest one found.
+        touching_at: f64,
+        /// The joint values at that time.
+        joints: Vec<f64>,
+        /// The bodies.
+        bodies: [String; 2],
+        /// Their distance at that time, with the points in the frames of shapes.
+        nearest: Distance,
+        /// The nearest points of both at that time, in the world.
+        points: [[f64; 3]; 2],
+    },
+    /// Two bodies come near, but it is undecided whether they come within the clearance: their gap falls below the tolerance
+    /// beyond it.
+    Near {
+        /// Before this time certainly no pair is within the clearance.
+        free_until: f64,
+        /// The time of the first undecided configuration.
+        at: f64,
+        /// The joint values at that time.
+        joints: Vec<f64>,
+        /// The bodies.
+        bodies: [String; 2],
+        /// Their distance at that time.
+        nearest: Distance,
+        /// The nearest points of both at that time, in the world.
+        points: [[f64; 3]; 2],
+    },
+}
+
+impl Robot {
+    /// Returns whether a straight motion in joint space is certainly free, at every moment. `false` means that two bodies touch at
+    /// some moment, or that their gap falls below the tolerance: a millionth of the size of the larger part, unless another one is
+    /// given ([`MotionOptions::tolerance`]).
+    ///
+    /// Cost: that of [`Querier::is_free`](bvh_query::Querier::is_free) for each pair that may come near on the way, until one is
+    /// not free. It grows with the number of turns, and turns of more than 16,384 radians are refused.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`].
+    pub fn is_free(&mut self, from: &[f64], to: &[f64]) -> Result<bool, RobotError> {
+        self.is_edge_free(&Edge::straight(from, to)?, &MotionOptions::default())
+    }
+
+    /// Returns whether a motion is certainly free, as [`Robot::is_free`] does.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`].
+    pub fn is_edge_free(&mut self, edge: &Edge, options: &MotionOptions) -> Result<bool, RobotError> {
+        self.refresh();
+        self.asker.is_free(&self.setting, edge, options)
+    }
+
+    /// Returns whether each of many motions is certainly free. Uses all threads of the rayon pool in which it is called.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`], of the first motion that has one.
+    pub fn are_free(&mut self, edges: &[Edge], options: &MotionOptions) -> Result<Vec<bool>, RobotError> {
+        self.many_edges(edges, |asker, setting, edge| asker.is_free(setting, edge, options))
+    }
+
+    /// Asks about many motions.
+    fn many_edges<R: Send>(
+        &mut self,
+        edges: &[Edge],
+        ask: impl Fn(&mut Asker, &Setting, &Edge) -> Result<R, RobotError> + Sync,
+    ) -> Result<Vec<R>, RobotError> {
+        self.refresh();
+        let (setting, asker) = (&*self.setting, &self.asker);
+        let ask = |asker: &mut Asker, edge: &Edge| ask(asker, setting, edge);
+        edges.par_iter().map_init(|| asker.clone(), ask).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Returns an error unless a motion is one of this robot: with a polynomial for each joint value, valid ends, and turns at no more
+    /// than 16,384 radians per motion. A quaternion's polynomials are straight.
+    ///
+    /// # Errors
+    /// [`RobotError::Count`] and [`RobotError::Value`].
+    pub fn check_edge(&self, edge: &Edge) -> Result<(), RobotError> {
+        check(&self.setting, edge)
+    }
+
+    /// Returns whether a motion is free, and otherwise what touches first, and when.
+    ///
+    /// Cost: that of [`Robot::is_edge_free`], and of [`Querier::motion`](bvh_query::Querier::motion) for each pair that is not free. Links
+    /// that slide along each other, less than the tolerance apart, take long, since each moment is undecided: allow their contact, or
+    /// give a larger tolerance.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`].
+    pub fn motion(&mut self, edge: &Edge, options: &MotionOptions) -> Result<RobotMotion, RobotError> {
+        self.refresh();
+        self.asker.motion(&self.setting, edge, options)
+    }
+
+    /// Returns for each of many motions what [`Robot::motion`] does. Uses all threads of the rayon pool in which it is called.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`], of the first motion that has one.
+    pub fn motions(
+        &mut self,
+        edges: &[Edge],
+        options: &MotionOptions,
+    ) -> Result<Vec<RobotMotion>, RobotError> {
+        self.many_edges(edges, |asker, setting, edge| asker.motion(setting, edge, options))
+    }
+
+    /// Returns what touches first on a path of straight motions through many configurations, with the number of the motion; `None`
+    /// if the whole path is free.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::is_free`].
+    pub fn first_hit<'a>(
+        &mut self,
+        path: impl IntoIterator<Item = &'a [f64]>,
+        options: &MotionOptions,
+    ) -> Result<Option<(usize, RobotMotion)>, RobotError> {
+        let mut path = path.into_iter();
+        let Some(mut from) = path.next() else { return Ok(None) };
+        for (number, to) in path.enumerate() {
+            let found = self.motion(&Edge::straight(from, to)?, options)?;
+            if found != RobotMotion::Free {
+                return Ok(Some((number, found)));
+            }
+            from = to;
+        }
+        Ok(None)
+    }
+}
+
+/// On an interval, paths that bend by no more than this part of their length are left to [`Querier`](bvh_query::Querier).
+const LITTLE_BENT: f64 = 0.25;
+/// The fastest turn of a joint, in radians per motion. What a motion costs is proportional to it.
+const MAX_TURN: f64 = 16384.0;
+/// The most intervals that are halved before all of the motion is left to the querier, which keeps fewer intervals in memory.
+const MOST_HALVED: u32 = 1 << 12;
+/// More than what [`MotionOptions`] takes for a tolerance, as a part of the radius of the larger ball: a millionth of a diagonal, which
+/// is at most 2 sqrt(3) radii.
+const DEFAULT_TOLERANCE: f64 = 4e-6;
+
+impl Asker {
+    fn is_free(
+        &mut self,
+        setting: &Setting,
+        edge: &Edge,
+        options: &MotionOptions,
+    ) -> Result<bool, RobotError> {
+        check(setting, edge)?;
+        // Pairs that stay apart would not refuse them.
+        options.check()?;
+        // Most motions that are not free touch at one of these.
+        if options.clearance == 0.0 {
+            for t in [1.0, 0.5, 0.25, 0.75] {
+                if self.collide(setting, &at(&setting.model, edge, t))? {
+                    return Ok(false);
+                }
+            }
+        }
+        for pair in &setting.pairs {
+            let path = PairPath::new(setting, pair, edge)?;
+            let free = self.is_pair_free(&path, options).map_err(|source| failed(setting, pair, source))?;
+            if !free {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Returns whether B stays farther from A than the clearance. An interval is free if what separates both in its middle is more
+    /// than B moves on the way there: seen from the balls around both, or else from the shapes. Others are halved, until the bound
+    /// of the sagitta decides, which is the better one for short intervals.
+    fn is_pair_free(&mut self, path: &PairPath<'_>, options: &MotionOptions) -> Result<bool, QueryError> {
+        let (a, b) = (path.a, path.b);
+        let size = a.radius.min(b.radius);
+        let limit =
+            options.clearance + options.tolerance.unwrap_or(DEFAULT_TOLERANCE * a.radius.max(b.radius));
+        let mut todo = VecDeque::from([[0.0, 1.0]]);
+        let mut halved = 0;
+        while let Some([t0, t1]) = todo.pop_front() {
+            let (middle, bound) = path.follow(b.middle, b.radius, [t0, t1]);
+            let moved = (bound.speed * (t1 - t0) / 2.0 + bound.rounding) * ROUNDED_UP + limit;
+            if length([0, 1, 2].map(|k| middle[k] - a.middle[k])) > path.reach + moved {
+                continue;
+            }
+            let at = (t0 + t1) / 2.0;
+            let bent = bound.acceleration * (t1 - t0).powi(2) / 8.0;
+            if bent > LITTLE_BENT * moved {
+                // Where the balls are all that is known, and far apart, a look at the shapes would not help.
+                let is_near =
+                    moved > size || self.querier.within(&a.shape, &b.shape, &path.pose(at), moved)?;
+                if is_near {
+                    halved += 1;
+                    if halved == MOST_HALVED {
+                        return self.querier.is_free(&a.shape, &b.shape, path, options);
+                    }
+                    todo.extend([[t0, at], [at, t1]]);
+                }
+            } else if !self.querier.is_free(
+                &a.shape,
+                &b.shape,
+                &Interval { path, ends: [t0, t1] },
+                options,
+            )? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn motion(
+        &mut self,
+        setting: &Setting,
+        edge: &Edge,
+        options: &MotionOptions,
+    ) -> Result<RobotMotion, RobotError> {
+        check(setting, edge)?;
+        // Pairs that stay apart would not refuse them.
+        options.check()?;
+        let (mut free_until, mut first): (f64, Option<(bool, f64, usize)>) = (1.0, None);
+        for (number, pair) in setting.pairs.iter().enumerate() {
+            let path = PairPath::new(setting, pair, edge)?;
+            let failed = |source| failed(setting, pair, source);
+            if self.is_pair_free(&path, options).map_err(failed)? {
+                continue;
+            }
+            let answer = self.querier.motion(&path.a.shape, &path.b.shape, &path, options);
+            let (free, found) = match answer.map_err(failed)? {
+                MotionAnswer::Free => continue,
+                MotionAnswer::Hit { free_until, touching_at, .. } => {
+                    (free_until, (true, touching_at, number))
+                }
+                MotionAnswer::Near { free_until, at, .. } => (free_until, (false, at, number)),
+            };
+            free_until = free_until.min(free);
+            // A hit counts before what is only near, however early that is, because it is certain.
+            let order = |of: &(bool, f64, usize)| (!of.0, of.1);
+            if first.as_ref().is_none_or(|held| order(&found) < order(held)) {
+                first = Some(found);
+            }
+        }
+        let Some((is_hit, time, number)) = first else { return Ok(RobotMotion::Free) };
+        let (joints, bodies) = (at(&setting.model, edge, time), bodies(setting, number));
+        self.place(setting, &joints)?;
+        let nearest = self.distance(setting, &setting.pairs[number])?;
+        let world = self.frame(setting, setting.pairs[number].a);
+        let points = [nearest.point_a, nearest.point_b].map(|point| world.place(point));
+        Ok(if is_hit {
+            RobotMotion::Hit { free_until, touching_at: time, joints, bodies, nearest, points }
+        } else {
+            RobotMotion::Near { free_until, at: time, joints, bodies, nearest, points }
+        })
+    }
+}
+
+/// Returns an error unless the edge is of all joint values, and both ends are valid. Quaternions only turn at a constant rate.
+fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
+    let model = &setting.model;
+    for t in [0.0, 1.0] {
+        let numbers: Vec<f64> = edge.coefficients.iter().map(|of| value(of, t)).collect();
+        model.check(&numbers)?;
+    }
+    for joint in &model.joints {
+        let [turn, _] = parts_of(&joint.kind, edge);
+        // NaN is not within anything.
+        if !(0.0..=MAX_TURN).contains(&turn.rate) {
+            let (joint, expected) = (joint.name.clone(), "a turn at no more than 16,384 radians per motion");
+            return Err(RobotError::Value { joint, expected, found: turn.rate });
+        }
+        if let Kind::Floating(first) = joint.kind
+            && let Some(found) = edge.coefficients[first + 3..first + 7].iter().find(|of| of.len() > 2)
+        {
+            let (joint, expected) =
+                (joint.name.clone(), "a quaternion on a straight motion, with 2 coefficients");
+            return Err(RobotError::Value { joint, expected, found: found.len() as f64 });
+        }
+    }
+    Ok(())
+}
