@@ -1245,7 +1245,7 @@ typedef struct cbvh_robot_motion_answer {
 
 /* Answers whether each motion from a start to an end is certainly free, at every moment. Each joint moves at a constant
  * rate, and a floating one turns about one axis, the shorter way. A path through `n` configurations is `n - 1` motions:
- * pass it for the starts, and its second configuration for the ends. */
+ * pass it for the starts, and its second configuration for the ends. Turns by more than 16,384 radians are refused. */
 cbvh_status cbvh_robot_edges_are_free(cbvh_robot robot, const double *starts, const double *ends, size_t joint_count,
                                       size_t count, const cbvh_motion_options *options, bool *answers);
 /* Answers whether each of these motions is free, and otherwise what touches first, and when. */
