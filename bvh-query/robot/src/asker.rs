@@ -1,7 +1,7 @@
 //! Asks about one configuration after the other: what a thread needs for itself.
 
 use crate::error::RobotError;
-use crate::frame::{Frame, Point};
+use crate::frame::{Frame, Point, each};
 use crate::robot::{Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, Querier, QueryError};
 
@@ -184,11 +184,11 @@ const ROUNDING: f64 = 1.0 / (1u64 << 42) as f64;
 /// Lin, Manocha, SIGGRAPH 1996).
 fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
     let middle = b_in_a.place(b.middle_of_box);
-    let way = [0, 1, 2].map(|k| middle[k] - a.middle_of_box[k]);
+    let way = each(|k| middle[k] - a.middle_of_box[k]);
     let (turn, half_a, half_b) = (&b_in_a.rotation, &a.half, &b.half);
     let size = half_a.iter().chain(half_b).chain(&a.middle_of_box).chain(&b.middle_of_box);
     let slack = slack + ROUNDING * size.map(|x| x.abs()).sum::<f64>();
-    let steep = turn.map(|row| row.map(|x| x.abs() + ROUNDING));
+    let steep = each(|i| each(|j| turn[i][j].abs() + ROUNDING));
     let on_a =
         |i: usize| way[i].abs() > half_a[i] + (0..3).map(|j| steep[i][j] * half_b[j]).sum::<f64>() + slack;
     let on_b = |j: usize| {
@@ -205,7 +205,7 @@ fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
 }
 
 fn squared_distance(a: &Point, b: &Point) -> f64 {
-    let way = [0, 1, 2].map(|k| b[k] - a[k]);
+    let way = each(|k| b[k] - a[k]);
     way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
 }
 

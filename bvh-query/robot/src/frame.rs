@@ -50,21 +50,18 @@ impl Frame {
 
     /// Returns the frame with the inner one seen from this one.
     pub(crate) fn relative(&self, inner: &Self) -> Self {
-        let way = [0, 1, 2].map(|k| inner.translation[k] - self.translation[k]);
+        let way = each(|k| inner.translation[k] - self.translation[k]);
         let column = |k: usize, v: Point| {
             self.rotation[0][k] * v[0] + self.rotation[1][k] * v[1] + self.rotation[2][k] * v[2]
         };
-        let of = |k: usize, j: usize| column(k, [0, 1, 2].map(|row| inner.rotation[row][j]));
-        Self {
-            rotation: [0, 1, 2].map(|k| [of(k, 0), of(k, 1), of(k, 2)]),
-            translation: [0, 1, 2].map(|k| column(k, way)),
-        }
+        let of = |k: usize, j: usize| column(k, each(|row| inner.rotation[row][j]));
+        Self { rotation: each(|k| each(|j| of(k, j))), translation: each(|k| column(k, way)) }
     }
 
     /// Returns where a point of the body is.
     #[inline]
     pub(crate) fn place(&self, [x, y, z]: Point) -> Point {
-        [0, 1, 2].map(|k| {
+        each(|k| {
             let row = &self.rotation[k];
             row[0] * x + row[1] * y + row[2] * z + self.translation[k]
         })
@@ -72,8 +69,8 @@ impl Frame {
 
     /// Returns where a point of the world is in the body's frame.
     pub(crate) fn find(&self, point: Point) -> Point {
-        let way = [0, 1, 2].map(|k| point[k] - self.translation[k]);
-        [0, 1, 2].map(|k| (0..3).map(|row| self.rotation[row][k] * way[row]).sum())
+        let way = each(|k| point[k] - self.translation[k]);
+        each(|k| (0..3).map(|row| self.rotation[row][k] * way[row]).sum())
     }
 
     /// Returns the frame as a pose.
@@ -89,8 +86,15 @@ impl From<&Pose> for Frame {
 }
 
 /// Returns the product of two matrices.
+#[inline]
 pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    a.map(|row| [0, 1, 2].map(|j| row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j]))
+    each(|i| each(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j]))
+}
+
+/// Returns what is said of each of three coordinates. Unlike `map` of an array, it is always compiled in place.
+#[inline(always)]
+pub(crate) fn each<T>(of: impl Fn(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
 }
 
 pub(crate) fn length(v: Point) -> f64 {

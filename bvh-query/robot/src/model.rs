@@ -3,7 +3,7 @@
 //! Links that only fixed joints connect are one body, a *group*, which has the frame of its first link. A joint connects two groups.
 
 use crate::error::RobotError;
-use crate::frame::{Frame, Point, product};
+use crate::frame::{Frame, Point, each, product};
 
 /// The links and joints of a robot.
 #[derive(Debug)]
@@ -159,8 +159,7 @@ impl Joint {
             Kind::Turn { by, turns: [still, first, second], .. } => {
                 let (sin, cos) = libm::sincos(by.at(numbers));
                 let versine = 1.0 - cos;
-                let rotation = [0, 1, 2]
-                    .map(|i| [0, 1, 2].map(|j| still[i][j] + sin * first[i][j] + versine * second[i][j]));
+                let rotation = each(|i| each(|j| still[i][j] + sin * first[i][j] + versine * second[i][j]));
                 Frame { rotation, translation: self.origin.translation }
             }
             Kind::Slide { by, axis } => {
