@@ -405,9 +405,15 @@ class Asking(unittest.TestCase):
         self.assertEqual(name, "obstacle 1")
         start, end = np.array([-0.5, 1.2, 0, 0]), np.array([0.5, 1.2, 0, 0])
         self.assertFalse(robot.is_free(start, end))
-        self.assertEqual(robot.motion(start, end).bodies[1], "obstacle 1")
+        hit, path = robot.motion(start, end), [start, start, end, start]
+        self.assertEqual(hit.bodies[1], "obstacle 1")
+        number, found = robot.first_hit(path)
+        self.assertEqual((number, found.kind, found.touching_at, found.bodies), (1, hit.kind, hit.touching_at, hit.bodies))
+        self.assertIsNone(robot.first_hit(path[:2]))
+        self.assertIsNone(robot.first_hit(path[:1]))
         robot.remove(name)
         self.assertTrue(robot.is_free(start, end))
+        self.assertIsNone(robot.first_hit(path, parallel=True))
 
     def test_polynomials(self):
         robot, _ = cell()

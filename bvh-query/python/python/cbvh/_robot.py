@@ -300,6 +300,19 @@ class Robot:
             raise ValueError("q0 and q1: expected one configuration each, found several")
         return self.motion_along(np.stack([from_[0], to[0] - from_[0]], axis=1), clearance=clearance, tolerance=tolerance)
 
+    def first_hit(
+        self, path: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None, parallel: bool = False
+    ) -> tuple[int, RobotMotion] | None:
+        """What touches first on the straight motions through the rows of ``path``: the number of the motion, from 0, and
+        its answer; None if the whole path is free. See `is_free`, which also tells whether each motion is free."""
+        rows, _ = self._rows(path, "path")
+        keys: dict[str, Any] = {"clearance": clearance, "tolerance": tolerance}
+        for number in np.flatnonzero(~self.is_free(rows[:-1], rows[1:], parallel=parallel, **keys)).tolist():
+            found = self.motion(rows[number], rows[number + 1], **keys)
+            if found.kind != MotionKind.FREE:
+                return number, found
+        return None
+
     def motion_along(
         self, coefficients: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None
     ) -> RobotMotion:
