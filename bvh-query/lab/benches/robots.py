@@ -1,7 +1,7 @@
 """Times certain edges of robots beside Pinocchio with Coal and states at intervals, and checks the answers of both.
 
     pip install pin ompl example-robot-data, and the module cbvh
-    RAYON_NUM_THREADS=1 taskset -c 0 python robots.py [ARM ...] [--edges 20000] [--timed 300] [--runs 11]
+    RAYON_NUM_THREADS=1 taskset -c 0 python robots.py [ARM ...] [--edges 20000] [--timed 300] [--runs 11] [--planners RRTConnect PRM]
 
 The arms and their cell are those of the examples (`python/examples/_cell.py`). Pinocchio has the same boxes and meshes, and
 the same pairs. An edge is straight between two free configurations; every second one is a tenth as long. A validator at
@@ -173,7 +173,7 @@ class Certified(base.MotionValidator):
         return self.robot.is_free(a, b)
 
 
-def measure_paths(arm, robot, other, low, high, options):
+def measure_paths(arm, robot, other, low, high, planner, options):
     size, seconds, free = len(low), {}, {}
     ways = {"cbvh, certain": None} | {f"Pinocchio, {share:.1%}": share for share in SHARES}
     for _ in range(options.runs):
@@ -198,18 +198,24 @@ def measure_paths(arm, robot, other, low, high, options):
                 for k, value in enumerate(values):
                     state[k] = value
             setup.setStartAndGoalStates(start, goal)
-            setup.setPlanner(geometric.RRTConnect(information))
+            setup.setPlanner(getattr(geometric, planner)(information))
             begin = time.process_time()
-            setup.solve(120.0)
-            assert setup.haveExactSolutionPath()
+            setup.solve(options.patience)
+            if not setup.haveExactSolutionPath():
+                continue
             planned = time.process_time() - begin
             setup.simplifySolution()
             q = np.array([[state[k] for k in range(size)] for state in setup.getSolutionPath().getStates()])
             seconds.setdefault(way, []).append((planned, time.process_time() - begin))
             free.setdefault(way, []).append(robot.is_free(q[:-1], q[1:]).all())
     for way in ways:
+        found = len(seconds.get(way, []))
+        if found == 0:
+            print(f"  {planner}, {way}: no path within {options.patience:.0f} s in {options.runs} runs")
+            continue
         planned, whole = np.median(seconds[way], axis=0)
-        print(f"  RRT-Connect, {way}: {planned:.2f} s planned, {whole:.2f} s with shortening; {sum(free[way])} of {options.runs} paths are certainly free")
+        print(f"  {planner}, {way}: {planned:.2f} s planned, {whole:.2f} s with shortening, in {found} of {options.runs} runs; "
+              f"{sum(free[way])} of these paths are certainly free")  # fmt: skip
 
 
 def main():
@@ -217,14 +223,18 @@ def main():
     parser.add_argument("arms", nargs="*", default=list(ENDS))
     for name, number in (("edges", 20_000), ("timed", 300), ("runs", 11), ("proved", 50)):
         parser.add_argument(f"--{name}", type=int, default=number)
+    parser.add_argument("--patience", type=float, default=60.0, help="seconds that a planner may take")
+    parser.add_argument("--planners", nargs="*", default=["RRTConnect", "PRM"])
     options = parser.parse_args()
     util.setLogLevel(util.LOG_WARN)
     for arm in options.arms:
         robot = arm_in_cell(arm)
         other, limits = Pinocchio(arm, robot), np.clip(robot.limits, -np.pi, np.pi)
         print(arm)
-        measure_edges(robot, other, limits[:, 0], limits[:, 1], options)
-        measure_paths(arm, robot, other, limits[:, 0], limits[:, 1], options)
+        if options.edges:
+            measure_edges(robot, other, limits[:, 0], limits[:, 1], options)
+        for planner in options.planners if options.runs else []:
+            measure_paths(arm, robot, other, limits[:, 0], limits[:, 1], planner, options)
         sys.stdout.flush()
 
 
