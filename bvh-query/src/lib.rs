@@ -118,6 +118,8 @@ pub use scene::{
     Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact,
     SceneDistance, SceneError, SceneFileError, SceneMotionAnswer, ScenePair, SceneRayHit, WorldPoseError,
 };
+#[cfg(feature = "trace")]
+pub use traverse::trace::{Step, record};
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///

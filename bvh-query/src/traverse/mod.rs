@@ -16,5 +16,7 @@ pub(crate) mod point_filter;
 pub(crate) mod probe_walk;
 pub(crate) mod slab_filter;
 pub(crate) mod slab_memory;
+#[cfg(feature = "trace")]
+pub(crate) mod trace;
 pub(crate) mod walk;
 pub(crate) mod walk_memory;

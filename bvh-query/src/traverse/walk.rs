@@ -35,6 +35,8 @@ use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerNode;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
+#[cfg(feature = "trace")]
+use crate::traverse::trace;
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
 
@@ -260,6 +262,8 @@ impl PairMemory {
     /// Starts a walk.
     #[inline(always)]
     fn start<I: Isa>(&mut self, isa: I, pair: &ObjectPair<'_>, sweeps: bool) -> Result<(), QueryError> {
+        #[cfg(feature = "trace")]
+        trace::objects(pair);
         self.walk += 1;
         self.stack.clear();
         self.leaf_pairs.clear();
@@ -369,6 +373,8 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         leaves: (LeafPacket, LeafPacket),
         at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
+        #[cfg(feature = "trace")]
+        trace::packets(leaves);
         let flow = isa.run(VisitLeaves { visitor: &mut *self.visitor, leaves, at_once })?;
         self.follow_visitor();
         Ok(flow)
@@ -432,10 +438,14 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         let b_is_small = extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b && !a_is_small;
         if !leaf_a && (leaf_b || !a_is_small) {
             let number = nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            #[cfg(feature = "trace")]
+            trace::opened(0, entry.a, number);
             (sides.node_a, sides.only_a) = (number, None);
         }
         if !leaf_b && (leaf_a || !b_is_small) {
             let number = nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
+            #[cfg(feature = "trace")]
+            trace::opened(1, entry.b, number);
             (sides.node_b, sides.only_b) = (number, None);
             let (to, is_aligned) = aligned_b.of(number, *walk);
             if !is_aligned {

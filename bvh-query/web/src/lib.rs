@@ -8,6 +8,8 @@
 mod answers;
 mod arguments;
 mod bake;
+#[cfg(feature = "inspect")]
+mod inspect;
 mod mesh;
 mod motions;
 mod overlaps;

@@ -1,0 +1,64 @@
+//! Records what the walks of two trees meet, for tools that show the work of a query. Needs the feature `trace`.
+//!
+//! Nodes are numbered as the walk numbers them: node 0 of each side has the object's root as its only child, and each
+//! opened node has the number that `Step::Opened` gives it, until the next `Step::Objects`. The pages of the file tell
+//! what the children of a node are.
+
+use crate::file::place::LeafPacket;
+use crate::traverse::node_cache::ChildRef;
+use crate::traverse::placement::ObjectPair;
+use std::cell::RefCell;
+
+/// What a walk does next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Starts to walk two objects, which have these first pages in the files of A and B.
+    Objects([u32; 2]),
+    /// Opens a node.
+    Opened {
+        /// 0 for A, 1 for B.
+        side: u8,
+        /// The number of the node's parent.
+        parent: u32,
+        /// Which child of the parent it is.
+        child: u8,
+        /// The number of the node.
+        node: u32,
+    },
+    /// Tests two leaf packets, of A and of B: the page of each, and its number in the page.
+    Packets([(u32, u16); 2]),
+}
+
+thread_local! {
+    /// The most steps, and those so far, while a question is recorded.
+    static STEPS: RefCell<Option<(usize, Vec<Step>)>> = const { RefCell::new(None) };
+}
+
+/// Asks a question on this thread, and returns the answer with the first `most` steps of its walks.
+pub fn record<T>(most: usize, ask: impl FnOnce() -> T) -> (T, Vec<Step>) {
+    STEPS.set(Some((most, Vec::new())));
+    let answer = ask();
+    (answer, STEPS.take().map(|(_, steps)| steps).unwrap_or_default())
+}
+
+fn add(step: Step) {
+    STEPS.with_borrow_mut(|recorded| {
+        if let Some((most, steps)) = recorded
+            && steps.len() < *most
+        {
+            steps.push(step);
+        }
+    });
+}
+
+pub(super) fn objects(pair: &ObjectPair<'_>) {
+    add(Step::Objects([pair.object_a, pair.object_b].map(|object| object.record().first_page.get())));
+}
+
+pub(super) fn opened(side: u8, at: ChildRef, node: usize) {
+    add(Step::Opened { side, parent: at.node() as u32, child: at.child() as u8, node: node as u32 });
+}
+
+pub(super) fn packets((a, b): (LeafPacket, LeafPacket)) {
+    add(Step::Packets([a, b].map(|leaf| (leaf.page, leaf.packet))));
+}

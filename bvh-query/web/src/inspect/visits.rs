@@ -1,0 +1,105 @@
+//! What a question about two meshes visits: which treelets it opens, and which packets it tests.
+
+use crate::answers::{floats, ids};
+use crate::arguments::{Answer, pose, refused, with_querier, wrong};
+use crate::inspect::tree::page;
+use crate::mesh::Mesh;
+use bvh_format::treelet::Child;
+use bvh_query::{Bvh, Step};
+use js_sys::{Array, Float64Array};
+use std::collections::BTreeMap;
+use wasm_bindgen::prelude::*;
+
+/// The most steps that are recorded: 64 MB of them.
+const MAX_STEPS: usize = 1 << 22;
+
+/// How often something was met, by page, and slot or packet.
+type Counts = BTreeMap<(u32, u16), u32>;
+
+/// What was met of one mesh.
+struct Side<'a> {
+    bvh: &'a Bvh,
+    /// The page and the slot of each opened node; node 0 stands for what is above the root.
+    nodes: Vec<Option<(u32, u8)>>,
+    first_page: u32,
+    opened: Counts,
+    tested: Counts,
+}
+
+impl Side<'_> {
+    fn start(&mut self, first_page: u32) {
+        self.first_page = first_page;
+        self.nodes.clear();
+    }
+
+    fn open(&mut self, parent: u32, child: u8, node: u32) -> Option<()> {
+        let at = if parent == 0 {
+            (self.first_page, 0)
+        } else {
+            let (number, slot) = (*self.nodes.get(parent as usize)?)?;
+            let object = self.bvh.objects().iter().find(|object| object.pages().contains(&number))?;
+            let page = page(self.bvh, object, number).ok()?;
+            match page.links(slot).child(child.into()) {
+                Child::Treelet(slot) => (number, slot),
+                Child::Remote(link) => (page.remote(link).page(), page.remote(link).root()),
+                Child::Leaf { .. } | Child::Empty => return None,
+            }
+        };
+        if self.nodes.len() <= node as usize {
+            self.nodes.resize(node as usize + 1, None);
+        }
+        self.nodes[node as usize] = Some(at);
+        *self.opened.entry((at.0, at.1.into())).or_default() += 1;
+        Some(())
+    }
+
+    /// Page, slot or packet, and count, one after the other, of the treelets and of the packets.
+    fn rows(&self) -> JsValue {
+        let rows = |of: &Counts| ids(of.iter().flat_map(|(&(page, at), &count)| [page, at.into(), count]));
+        [rows(&self.opened), rows(&self.tested)].into_iter().collect::<Array>().into()
+    }
+}
+
+/// Asks a question, `distance`, `collide` or `contacts`. Returns the numbers of node tests, packet tests, exact tests and recorded
+/// steps, and what was met of A and of B.
+#[wasm_bindgen]
+pub fn visits(a: &Mesh, b: &Mesh, pose_of_b: &Float64Array, question: &str) -> Answer<Array> {
+    let (of_b, shapes) = (pose(pose_of_b, "pose")?, [a, b].map(|mesh| mesh.shape.shape()));
+    let [in_a, in_b] = shapes;
+    let (asked, steps) = bvh_query::record(MAX_STEPS, || {
+        with_querier(|querier| {
+            match question {
+                "distance" => querier.distance(in_a, in_b, &of_b).map(|_| ()),
+                "collide" => querier.collide(in_a, in_b, &of_b).map(|_| ()),
+                "contacts" => querier.contacts(in_a, in_b, &of_b).map(|_| ()),
+                _ => return Err(wrong("question", "expected distance, collide or contacts")),
+            }
+            .map_err(refused)?;
+            Ok(querier.stats())
+        })
+    });
+    let stats = asked?;
+    let mut sides = shapes.map(|shape| Side {
+        bvh: shape.bvh(),
+        nodes: Vec::new(),
+        first_page: 0,
+        opened: Counts::new(),
+        tested: Counts::new(),
+    });
+    for step in &steps {
+        match *step {
+            Step::Objects(first) => sides.iter_mut().zip(first).for_each(|(side, page)| side.start(page)),
+            Step::Opened { side, parent, child, node } => {
+                let _ = sides[usize::from(side & 1)].open(parent, child, node);
+            }
+            Step::Packets(of) => {
+                for (side, at) in sides.iter_mut().zip(of) {
+                    *side.tested.entry(at).or_default() += 1;
+                }
+            }
+        }
+    }
+    let [of_a, of_b] = sides.map(|side| side.rows());
+    let numbers = [stats.node_tests, stats.packet_tests, stats.exact_tests, steps.len() as u64];
+    Ok([floats(numbers.into_iter().map(|number| number as f64)), of_a, of_b].into_iter().collect())
+}

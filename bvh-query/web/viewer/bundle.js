@@ -1,0 +1,89 @@
+/** Bundles the page into one file: node bundle.js PAGE.html. Says what each part takes, and refuses a page that is too large. */
+
+import { mkdir, readFile, writeFile } from "node:fs/promises";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
+import { build, transform } from "esbuild";
+
+/** The most bytes of a page without meshes. */
+const MAX_BYTES = 1_500_000;
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+const inside = (...names) => path.join(here, ...names);
+const read = (...names) => readFile(inside(...names), "utf8");
+const { version } = JSON.parse(await read("..", "package.json"));
+
+/** The raw module of this page, in place of that of the package. */
+const rawModule = {
+    name: "raw module",
+    setup: (to) => to.onResolve({ filter: /\/raw\/cbvh\.js$/ }, () => ({ path: inside("dist", "raw", "cbvh.js") })),
+};
+
+async function bundle(entry) {
+    const result = await build({
+        entryPoints: [inside(entry)],
+        bundle: true,
+        write: false,
+        minify: true,
+        format: "iife",
+        target: ["chrome100", "firefox113", "safari16.4"],
+        legalComments: "none",
+        define: { VERSION: JSON.stringify(version), "import.meta.url": '"about:blank"' },
+        plugins: [rawModule],
+        logLevel: "warning",
+    });
+    return Buffer.from(result.outputFiles[0].contents);
+}
+
+/** Of licences joined by "or", the MIT licence is chosen, so that texts of the Apache licence are left out. */
+async function licences() {
+    const line = "=".repeat(100);
+    const [head, ...rest] = (await read("dist", "licences.txt")).split(`\n${line}\n`);
+    const kept = [head];
+    for (let place = 0; place + 1 < rest.length; place += 2) {
+        const [names, text] = [rest[place], rest[place + 1]];
+        const isApache = /^\s*Apache License/.test(text);
+        const others = rest.filter((_, k) => k % 2 === 0 && k !== place).join("\n");
+        if (!isApache || !names.split(", ").every((name) => others.includes(name))) {
+            kept.push(`${names}\n${text.trim()}\n`);
+        }
+    }
+    const { version: three } = JSON.parse(await read("..", "node_modules", "three", "package.json"));
+    kept.push(`three ${three}\n\n${(await read("..", "node_modules", "three", "LICENSE")).trim()}\n`);
+    return Buffer.from(kept.join(`\n${"-".repeat(72)}\n`));
+}
+
+/** Packs a part as base64 of gzip. The header of gzip has no time, so that the bytes depend on the part alone. */
+function packed(id, bytes) {
+    const small = gzipSync(bytes, { level: 9 });
+    const text = small.toString("base64");
+    console.log(
+        `${id.padEnd(14)} ${String(bytes.length).padStart(8)} bytes, ${String(small.length).padStart(7)} by gzip, ${text.length} in the page`,
+    );
+    return `<script type="text/plain" id="${id}">${text}</script>`;
+}
+
+const parts = [
+    packed("cbvh-main", await bundle("page/main.ts")),
+    packed("cbvh-worker", await bundle("worker/worker.ts")),
+    packed("cbvh-module", await readFile(inside("dist", "raw", "cbvh_bg.wasm"))),
+    packed("cbvh-licences", await licences()),
+];
+const style = await transform(await read("page", "style.css"), { loader: "css", minify: true });
+const boot = await transform(await read("page", "boot.js"), { loader: "js", minify: true });
+const fill = { "/*STYLE*/": style.code.trim(), "/*PARTS*/": parts.join("\n"), "/*BOOT*/": boot.code.trim() };
+const page = Object.entries(fill).reduce(
+    (text, [mark, by]) => text.replace(mark, () => by),
+    await read("page", "index.html"),
+);
+if (page.split("\n").filter((line) => line === "<!--cbvh:content-->").length !== 1) {
+    throw new Error("index.html: expected one line <!--cbvh:content-->");
+}
+console.log(`${"page".padEnd(14)} ${String(page.length).padStart(8)} bytes of at most ${MAX_BYTES}`);
+if (page.length > MAX_BYTES) {
+    throw new Error(`the page: expected at most ${MAX_BYTES} bytes, found ${page.length}`);
+}
+const to = process.argv[2];
+await mkdir(path.dirname(to), { recursive: true });
+await writeFile(to, page);

@@ -1,0 +1,65 @@
+/** Starts the page: unpacks the worker and the module, shows the content, and says when it is drawn. */
+
+import { App } from "./app.js";
+import { Asker } from "./asker.js";
+import { readContent } from "./content.js";
+import { describe, failPage, messageOf } from "./errors.js";
+import { listen } from "./keys.js";
+import { restore } from "./link.js";
+import { unpack } from "./unpack.js";
+
+/** Refuses a browser that cannot show the page. The worker checks for SIMD. */
+function checkBrowser(): void {
+    if (typeof WebAssembly !== "object" || typeof WebAssembly.instantiate !== "function") {
+        throw new Error("this page needs WebAssembly, which is switched off in this browser");
+    }
+    const context = document.createElement("canvas").getContext("webgl2");
+    if (context === null) {
+        throw new Error(
+            "this page draws with WebGL 2, which this browser does not offer; is the graphics card switched off?",
+        );
+    }
+    context.getExtension("WEBGL_lose_context")?.loseContext();
+}
+
+async function start(): Promise<void> {
+    const root = document.documentElement;
+    const loading = document.querySelector("#loading .loading-text");
+    const say = (text: string) => {
+        if (loading !== null) {
+            loading.textContent = text;
+        }
+    };
+    let name = "";
+    try {
+        checkBrowser();
+        const filled = readContent();
+        const [worker, module] = await Promise.all([unpack("cbvh-worker"), unpack("cbvh-module")]);
+        const asker = new Asker(worker);
+        await asker.ask("start", module);
+        const host = document.getElementById("app");
+        if (host === null) {
+            throw new Error("expected the element #app in this page, found none");
+        }
+        const app = new App(asker, host);
+        listen(app);
+        if (filled === undefined) {
+            app.showNothing();
+        } else {
+            await app.show(filled.content, filled.packed, (file) => {
+                name = file;
+                say(`Reading ${file}`);
+            });
+            await restore(app);
+        }
+        app.stage.drawNow();
+        document.getElementById("loading")?.remove();
+        root.dataset.state = "ready";
+        Object.assign(window, { cbvhView: app });
+    } catch (error) {
+        const message = messageOf(error);
+        failPage("This page cannot show the meshes", describe(name, message));
+    }
+}
+
+void start();

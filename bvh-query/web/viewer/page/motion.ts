@@ -1,0 +1,288 @@
+/** Motions of B: where they are certainly free, the first hit, and a slider that plays them. */
+
+import { Mesh, type Object3D } from "three";
+import type { MotionAnswer } from "../../ts/answers.js";
+import type { App } from "./app.js";
+import { type Body, material } from "./bodies.js";
+import { exact, fact, fill, h, iconButton, milliseconds, pointOf } from "./dom.js";
+import { messageOf } from "./errors.js";
+import { Overlay } from "./overlays.js";
+import { part } from "./panel.js";
+import { move, numbersOf, words } from "./pose.js";
+
+/** How long a motion plays, in milliseconds. */
+const DURATION = 4000;
+/** Places of B's centre along the path that are drawn. */
+const PATH_POINTS = 96;
+
+export class MotionView {
+    readonly #page: HTMLElement;
+    readonly #overlay: Overlay;
+    readonly #answerBox = h("div", { class: "answer" });
+    readonly #slider = h("input", {
+        type: "range",
+        min: "0",
+        max: "1",
+        step: "any",
+        value: "0",
+        class: "timeline",
+        "aria-label": "Time of the motion",
+    });
+    readonly #time = h("output", { class: "number time" }, "t = 0");
+    readonly #rows = h("textarea", {
+        class: "code",
+        rows: "6",
+        spellcheck: "false",
+        "aria-label": "24 numbers of the motion",
+    });
+    readonly #clearance = h("input", {
+        type: "number",
+        step: "any",
+        min: "0",
+        value: "0",
+        class: "field",
+        "aria-label": "Clearance",
+    });
+    readonly #play = iconButton("play", "Play or pause (Space)", () => this.toggle());
+    #motion: Float64Array | undefined;
+    #tolerance: number | undefined;
+    #ghosts: Object3D[] = [];
+    #playing = 0;
+
+    constructor(readonly app: App) {
+        this.#overlay = new Overlay(app.stage, 10);
+        this.#overlay.isVisible = false;
+        this.#page = app.panel.add("motion", "Motion", (shown) => {
+            this.#overlay.isVisible = shown;
+            for (const ghost of this.#ghosts) {
+                ghost.visible = shown;
+            }
+            if (!shown) {
+                this.stop();
+            }
+        });
+        this.#slider.addEventListener("input", () => void this.go(this.#slider.valueAsNumber));
+        this.#rows.addEventListener("change", () => this.#read());
+        this.#clearance.addEventListener("change", () => void this.#ask());
+        const set = (end: 0 | 1) => () => {
+            const motion = this.#motion?.slice() ?? Float64Array.of(...app.pair.pose, ...app.pair.pose);
+            motion.set(app.pair.pose, 12 * end);
+            void this.set(motion);
+        };
+        this.#page.append(
+            this.#answerBox,
+            h("div", { class: "player" }, this.#play, this.#slider, this.#time),
+            part(
+                "Ends",
+                h(
+                    "div",
+                    { class: "row" },
+                    h("button", { type: "button", class: "button", click: set(0) }, "Start here"),
+                    h("button", { type: "button", class: "button", click: set(1) }, "End here"),
+                ),
+                h(
+                    "p",
+                    { class: "muted" },
+                    "Move B, then press one of these. The origin of B moves on a line, and B turns about one axis.",
+                ),
+                h("label", { class: "fields" }, h("span", { class: "fields-title" }, "clearance"), this.#clearance),
+                h("div", { class: "fields-title" }, "pose at the start, pose at the end"),
+                this.#rows,
+            ),
+        );
+        this.#showNothing();
+    }
+
+    #showNothing(): void {
+        fill(this.#answerBox, h("p", { class: "muted" }, "No motion yet. Set its start and its end below."));
+    }
+
+    get motion(): Float64Array | undefined {
+        return this.#motion;
+    }
+
+    get clearance(): number {
+        return Number(this.#clearance.value) || 0;
+    }
+
+    get tolerance(): number | undefined {
+        return this.#tolerance;
+    }
+
+    get time(): number {
+        return this.#slider.valueAsNumber;
+    }
+
+    clear(): void {
+        this.stop();
+        this.#motion = undefined;
+        this.#overlay.clear();
+        this.#removeGhosts();
+        this.#rows.value = "";
+        this.#showNothing();
+    }
+
+    async set(motion: Float64Array, clearance?: number, tolerance?: number | null): Promise<void> {
+        this.#motion = motion;
+        if (clearance !== undefined) {
+            this.#clearance.value = String(clearance);
+        }
+        this.#tolerance = tolerance ?? undefined;
+        const row = (at: number) => Array.from(motion.subarray(at, at + 4), String).join("  ");
+        this.#rows.value = [0, 4, 8, 12, 16, 20].map(row).join("\n");
+        await this.#ask();
+    }
+
+    async #ask(): Promise<void> {
+        const { a, b } = this.app.pair;
+        const motion = this.#motion;
+        if (a === undefined || b === undefined || motion === undefined) {
+            return;
+        }
+        try {
+            const answer = await this.app.asker.ask("motion", a.side, b.side, motion, this.clearance, this.#tolerance);
+            this.#showAnswer(answer, answer.took);
+            await this.#drawPath(b, motion, answer);
+            await this.go(this.time);
+        } catch (error) {
+            fill(this.#answerBox, h("p", { class: "problem" }, messageOf(error)));
+        }
+    }
+
+    #showAnswer(answer: MotionAnswer, took: number): void {
+        const { kind, freeUntil, at, nearest } = answer;
+        const clearance = this.clearance;
+        const within = clearance > 0 ? ` by more than ${clearance}` : "";
+        const name = ["Free", "Hit", "Near"][kind] ?? "";
+        const says = [
+            `apart${within} at every moment`,
+            clearance > 0 ? `within ${clearance} at t = ${at}` : `touches at t = ${at}`,
+            `within the clearance and the tolerance at t = ${at}, undecided there`,
+        ][kind];
+        fill(
+            this.#answerBox,
+            h("div", { class: `relation ${["free", "hit", "near"][kind] ?? ""}` }, name),
+            h("p", {}, says ?? ""),
+            h(
+                "dl",
+                { class: "facts" },
+                fact("certainly free until", "t = ", exact(freeUntil)),
+                kind !== 0 && fact("first hit", "t = ", exact(at)),
+                nearest !== undefined && fact("point on A", pointOf(nearest.pointA)),
+                nearest !== undefined && fact("triangles", `${nearest.triangleA} of A, ${nearest.triangleB} of B`),
+                fact("answered in", milliseconds(took)),
+            ),
+            kind !== 0 &&
+                h("button", { type: "button", class: "button", click: () => void this.go(at) }, "Go to the first hit"),
+        );
+        const percent = (share: number) => `${(100 * share).toFixed(3)}%`;
+        const style = this.#slider.style;
+        style.setProperty("--free", percent(freeUntil));
+        style.setProperty("--hit", percent(kind === 0 ? 1 : at));
+        this.#slider.classList.toggle("has-hit", kind !== 0);
+    }
+
+    async #drawPath(b: Body, motion: Float64Array, answer: MotionAnswer): Promise<void> {
+        const times = Float64Array.from({ length: PATH_POINTS + 1 }, (_, k) => k / PATH_POINTS);
+        const ends = answer.kind === 0 ? [0, 1] : [0, 1, answer.at];
+        const poses = await this.app.asker.ask("motionPoses", motion, Float64Array.of(...times, ...ends));
+        const centre = (k: number) => move(poses.subarray(12 * k, 12 * k + 12), b.shown.centre);
+        const { palette } = this.app.stage;
+        this.#overlay.clear();
+        const [free, rest]: [number[], number[]] = [[], []];
+        for (let k = 0; k < PATH_POINTS; k++) {
+            const into = (times[k + 1] ?? 0) <= answer.freeUntil ? free : rest;
+            into.push(...centre(k), ...centre(k + 1));
+        }
+        this.#overlay.segments(free, palette.near, 2.5);
+        this.#overlay.segments(rest, palette.still, 2, { dashed: true });
+        const { nearest } = answer;
+        if (nearest !== undefined) {
+            this.#overlay.dots(nearest.pointA, palette.hit, 14);
+            this.#overlay.label("first hit", nearest.pointA, "hit");
+        }
+        this.#removeGhosts();
+        if (b.shown.triangles > 300_000) {
+            return;
+        }
+        ends.forEach((_, k) => {
+            const ghost = new Mesh(
+                b.shown.geometry,
+                material(k === 2 ? palette.hit : palette.b, { transparent: true, opacity: 0.16 }),
+            );
+            ghost.material.depthWrite = false;
+            ghost.material.flatShading = b.mesh.material.flatShading;
+            ghost.renderOrder = 2;
+            const at = PATH_POINTS + 1 + k;
+            this.app.stage.place(ghost, poses.slice(12 * at, 12 * at + 12), b.shown.centre);
+            ghost.visible = this.app.panel.current === "motion";
+            this.app.stage.scene.add(ghost);
+            this.#ghosts.push(ghost);
+        });
+    }
+
+    #removeGhosts(): void {
+        for (const ghost of this.#ghosts.splice(0)) {
+            ghost.removeFromParent();
+        }
+        this.app.stage.draw();
+    }
+
+    /** Moves B to a time. */
+    async go(time: number): Promise<void> {
+        const motion = this.#motion;
+        if (motion === undefined) {
+            return;
+        }
+        this.#slider.value = String(time);
+        this.#time.textContent = `t = ${time.toFixed(4)}`;
+        const pose = await this.app.asker.ask("motionPoses", motion, Float64Array.of(time));
+        await this.app.pair.setPose(pose);
+    }
+
+    toggle(): void {
+        if (this.#playing !== 0) {
+            this.stop();
+            return;
+        }
+        if (this.#motion === undefined) {
+            return;
+        }
+        const from = this.time >= 1 ? 0 : this.time;
+        const began = performance.now() - from * DURATION;
+        fill(this.#play, ...iconButton("pause", "", () => {}).childNodes);
+        const step = async () => {
+            const time = Math.min((performance.now() - began) / DURATION, 1);
+            await this.go(time);
+            if (this.#playing === 0) {
+                return;
+            }
+            if (time >= 1) {
+                this.stop();
+            } else {
+                this.#playing = requestAnimationFrame(() => void step());
+            }
+        };
+        this.#playing = requestAnimationFrame(() => void step());
+    }
+
+    stop(): void {
+        cancelAnimationFrame(this.#playing);
+        this.#playing = 0;
+        fill(this.#play, ...iconButton("play", "", () => {}).childNodes);
+    }
+
+    #read(): void {
+        const numbers = numbersOf(this.#rows.value);
+        if (numbers.length === 24 && numbers.every(Number.isFinite)) {
+            void this.set(Float64Array.from(numbers));
+        } else {
+            this.app.messages.say(`A motion has 24 numbers, found ${numbers.length}.`);
+        }
+    }
+
+    /** What asks the same on the command line. */
+    get words(): string {
+        return this.#motion === undefined ? "" : words(this.#motion);
+    }
+}

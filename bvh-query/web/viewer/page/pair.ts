@@ -1,0 +1,387 @@
+/** Two meshes: moves B, asks about each pose, and shows the answers on the stage and as numbers. */
+
+import type { DeepAnswer, NearAnswer } from "../worker/pairs.js";
+import type { App } from "./app.js";
+import { Latest } from "./asker.js";
+import type { Body } from "./bodies.js";
+import { countOf, exact, fact, fill, h, milliseconds, pointOf, short } from "./dom.js";
+import { messageOf } from "./errors.js";
+import { Overlay } from "./overlays.js";
+import { part } from "./panel.js";
+import { axisAngle, fromAxisAngle, identity, numbersOf, type Pose, placedAt, position, words } from "./pose.js";
+
+const RELATIONS = ["Touching", "Apart", "A is inside B", "B is inside A", "Partly inside", "Apart"] as const;
+/** How long the pose stays before what takes longer is asked, in milliseconds. */
+const PAUSE = 90;
+
+export class Pair {
+    #a: Body | undefined;
+    #b: Body | undefined;
+    pose: Pose = identity();
+    /** The distance that the command was asked to compare with. */
+    within: number | undefined;
+    readonly #overlay: Overlay;
+    readonly #deepOverlay: Overlay;
+    readonly #latest = new Latest();
+    readonly #page: HTMLElement;
+    readonly #answer = h("div", { class: "answer", "aria-live": "polite" });
+    readonly #depth = h("div");
+    readonly #speed = h("div", { class: "row" });
+    readonly #fields: Record<string, HTMLInputElement> = {};
+    readonly #rows = h("textarea", {
+        class: "code",
+        rows: "3",
+        spellcheck: "false",
+        "aria-label": "Twelve numbers of the pose",
+    });
+    #timer = 0;
+    #asked = 0;
+    near: NearAnswer | undefined;
+    deep: DeepAnswer | undefined;
+    /** Called after each answer. */
+    readonly onAnswer: ((answer: NearAnswer) => void)[] = [];
+
+    constructor(readonly app: App) {
+        this.#overlay = new Overlay(app.stage, 20);
+        this.#deepOverlay = new Overlay(app.stage, 30);
+        this.#page = app.panel.add("pair", "Pair");
+        this.#page.append(
+            this.#answer,
+            part("Depth and contact", this.#depth),
+            part("Place of B in the frame of A", this.#poseFields()),
+            part("Speed", this.#speed),
+        );
+        const measure = h("button", { type: "button", class: "button", click: () => void this.#measure() }, "Measure");
+        fill(this.#speed, measure, h("span", { class: "muted" }, "questions per second in this page"));
+    }
+
+    get a(): Body | undefined {
+        return this.#a;
+    }
+
+    get b(): Body | undefined {
+        return this.#b;
+    }
+
+    get isComplete(): boolean {
+        return this.#a !== undefined && this.#b !== undefined;
+    }
+
+    /** Adopts two meshes, or one. */
+    async set(a: Body | undefined, b: Body | undefined, pose: Pose): Promise<void> {
+        this.#a = a;
+        this.#b = b;
+        this.app.handles.attach(b);
+        this.clear();
+        if (b !== undefined) {
+            await this.setPose(pose);
+        }
+    }
+
+    clear(): void {
+        clearTimeout(this.#timer);
+        this.#asked++;
+        this.near = this.deep = undefined;
+        this.#overlay.clear();
+        this.#deepOverlay.clear();
+        fill(this.#answer);
+        fill(this.#depth);
+    }
+
+    set isVisible(visible: boolean) {
+        this.#overlay.isVisible = visible;
+        this.#deepOverlay.isVisible = visible;
+    }
+
+    /** Moves B, and asks. The answer has been shown when the promise is done. */
+    setPose(pose: Pose): Promise<void> {
+        const { b } = this;
+        if (b === undefined) {
+            return Promise.resolve();
+        }
+        this.pose = pose;
+        b.setPose(pose);
+        this.app.handles.follow();
+        this.#showPose();
+        return this.refresh();
+    }
+
+    /** Asks about the pose again. */
+    refresh(): Promise<void> {
+        clearTimeout(this.#timer);
+        const number = ++this.#asked;
+        return new Promise((resolve) => {
+            this.#latest.run(async () => {
+                await this.#ask(this.pose);
+                resolve();
+                if (number === this.#asked) {
+                    this.#timer = window.setTimeout(() => this.#latest.run(() => this.#askMore(number)), PAUSE);
+                }
+            });
+        });
+    }
+
+    async #ask(pose: Pose): Promise<void> {
+        const { a, b } = this;
+        if (a === undefined || b === undefined) {
+            return;
+        }
+        try {
+            const near = await this.app.asker.ask("near", a.side, b.side, pose, this.within);
+            this.near = near;
+            this.deep = undefined;
+            this.#showNear(near, pose);
+            this.app.setAnswer({
+                distance: near.distance.distance,
+                lower: near.distance.lower,
+                upper: near.distance.upper,
+                relation: near.relation,
+                contacts: near.contacts,
+                triangles: [a.shown.summary.triangles, b.shown.summary.triangles],
+                pose: [...pose],
+            });
+            for (const told of this.onAnswer) {
+                told(near);
+            }
+        } catch (error) {
+            fill(this.#answer, h("p", { class: "problem" }, messageOf(error)));
+        }
+    }
+
+    async #askMore(number: number): Promise<void> {
+        const { a, b, near } = this;
+        if (a === undefined || b === undefined || near === undefined || number !== this.#asked) {
+            return;
+        }
+        if (near.distance.distance > 0 && (near.relation === undefined || near.relation === 1 || near.relation === 5)) {
+            return;
+        }
+        try {
+            const deep = await this.app.asker.ask("deep", a.side, b.side, this.pose);
+            if (number === this.#asked) {
+                this.deep = deep;
+                this.#showDeep(deep);
+            }
+        } catch (error) {
+            fill(this.#depth, h("p", { class: "problem" }, messageOf(error)));
+        }
+    }
+
+    #showNear(near: NearAnswer, pose: Pose): void {
+        const { a, b } = this;
+        if (a === undefined || b === undefined) {
+            return;
+        }
+        const { distance } = near;
+        const { palette } = this.app.stage;
+        this.#overlay.clear();
+        this.#deepOverlay.clear();
+        if (near.contacts > 0) {
+            this.#overlay.triangles(a, near.touchingA, palette.hit);
+            this.#overlay.triangles(b, near.touchingB, palette.hit);
+        } else {
+            const ends = [...distance.pointA, ...distance.pointB];
+            this.#overlay.segments(ends, palette.near, 3);
+            this.#overlay.dots(ends, palette.near, 11);
+            const middle = [0, 1, 2].map((k) => ((ends[k] ?? 0) + (ends[k + 3] ?? 0)) / 2);
+            if (distance.distance > 0) {
+                this.#overlay.label(short(distance.distance), middle, "near");
+            }
+        }
+        const touches = near.contacts > 0 || distance.distance === 0;
+        const name = near.relation === undefined ? (touches ? "Touching" : "Apart") : (RELATIONS[near.relation] ?? "");
+        const kind = touches
+            ? "hit"
+            : near.relation === 1 || near.relation === 5 || near.relation === undefined
+              ? "free"
+              : "in";
+        const summary = (body: Body, object: number, triangle: number) => {
+            const { objects } = body.shown.summary;
+            const of = objects.length > 1 ? ` of ${objects[object] || `object ${object}`}` : "";
+            return `${countOf(triangle)}${of}`;
+        };
+        fill(
+            this.#answer,
+            h("div", { class: `relation ${kind}` }, name),
+            h(
+                "div",
+                { class: "headline" },
+                h("span", { class: "headline-number", title: String(distance.distance) }, short(distance.distance)),
+                h("span", { class: "muted" }, touches ? "they have points in common" : "mesh units apart"),
+            ),
+            h(
+                "dl",
+                { class: "facts" },
+                distance.lower !== distance.upper &&
+                    fact(
+                        "certainly",
+                        h(
+                            "span",
+                            { class: "number", title: `${distance.lower} to ${distance.upper}` },
+                            `${distance.lower} to ${distance.upper}`,
+                        ),
+                    ),
+                near.within !== undefined && fact(`within ${this.within}`, near.within ? "yes" : "no"),
+                touches && fact("pairs of triangles", countOf(near.contacts)),
+                fact("point on A", pointOf(distance.pointA)),
+                fact("point on B", pointOf(distance.pointB)),
+                fact("triangle of A", summary(a, distance.objectA, distance.triangleA)),
+                fact("triangle of B", summary(b, distance.objectB, distance.triangleB)),
+                near.relation === 5 && fact("inside", "unknown, because a mesh is not closed"),
+                near.relation === undefined && fact("inside", "unknown, because a file does not state what is closed"),
+                fact("answered in", `${milliseconds(near.distanceTook)} (distance), ${milliseconds(near.took)} (all)`),
+            ),
+        );
+        void pose;
+        const isApart = !touches && kind === "free";
+        fill(this.#depth, h("p", { class: "muted" }, isApart ? "The meshes are apart." : "…"));
+    }
+
+    #showDeep(deep: DeepAnswer): void {
+        const { palette } = this.app.stage;
+        const { near } = this;
+        const { depth } = deep;
+        this.#deepOverlay.clear();
+        this.#deepOverlay.segments(deep.curves, palette.hit, 2.5, { faint: 0.55 });
+        const size = this.app.size;
+        for (let k = 0; k < deep.centres.length; k += 3) {
+            const normal = deep.normals.subarray(k, k + 3);
+            const length = 0.07 * size;
+            this.#deepOverlay.arrow(
+                deep.centres.subarray(k, k + 3),
+                Array.from(normal, (value) => value * length),
+                palette.normal,
+                0.005,
+            );
+        }
+        const rows: (HTMLElement | false)[] = [fact("contact patches", countOf(deep.patches))];
+        if (typeof depth === "string") {
+            rows.unshift(fact("depth", h("span", { class: "muted" }, depth)));
+        } else {
+            const from = near?.contacts === 0 ? near.distance.pointB : firstOf(deep.centres, depth.point);
+            this.#deepOverlay.arrow(from, depth.translation, palette.depth, 0.012);
+            if (depth.upper > 0.02 * size) {
+                const tip = [0, 1, 2].map((k) => (from[k] ?? 0) + (depth.translation[k] ?? 0));
+                this.#deepOverlay.label(`${short(depth.upper)} out`, tip, "depth");
+            }
+            rows.unshift(
+                fact("depth", h("span", {}, "from ", exact(depth.lower), " to ", exact(depth.upper))),
+                fact("moves B out", pointOf(depth.translation)),
+            );
+        }
+        rows.push(fact("answered in", milliseconds(deep.took)));
+        const out =
+            typeof depth !== "string" &&
+            depth.upper > 0 &&
+            h(
+                "button",
+                { type: "button", class: "button", click: () => this.#moveOut(depth.translation) },
+                "Move B out",
+            );
+        fill(this.#depth, h("dl", { class: "facts" }, ...rows), out);
+    }
+
+    #moveOut(translation: Float64Array): void {
+        const [x, y, z] = position(this.pose);
+        const [dx = 0, dy = 0, dz = 0] = translation;
+        void this.setPose(placedAt(this.pose, [x + dx, y + dy, z + dz]));
+    }
+
+    #poseFields(): HTMLElement {
+        const field = (name: string, title: string, unit = "") => {
+            const input = h("input", {
+                type: "number",
+                step: "any",
+                class: "field",
+                title,
+                "aria-label": title,
+                change: () => this.#readFields(),
+            });
+            this.#fields[name] = input;
+            return h("label", { class: "field-of" }, h("span", {}, name.slice(-1)), input, unit);
+        };
+        const row = (title: string, ...fields: HTMLElement[]) =>
+            h("div", { class: "fields" }, h("span", { class: "fields-title" }, title), ...fields);
+        this.#rows.addEventListener("change", () => this.#readRows());
+        const home = h(
+            "button",
+            { type: "button", class: "button", click: () => void this.setPose(identity()) },
+            "Identity",
+        );
+        const copy = h(
+            "button",
+            { type: "button", class: "button", click: () => void this.app.copy(words(this.pose), "The pose") },
+            "Copy",
+        );
+        return h(
+            "div",
+            {},
+            row("position", field("px", "Position, x"), field("py", "Position, y"), field("pz", "Position, z")),
+            row("axis", field("ax", "Axis, x"), field("ay", "Axis, y"), field("az", "Axis, z")),
+            row("angle", field("a°", "Angle in degrees")),
+            h("div", { class: "fields-title" }, "rows of the 3 by 4 matrix"),
+            this.#rows,
+            h("div", { class: "row" }, copy, home),
+        );
+    }
+
+    #showPose(): void {
+        const { axis, angle } = axisAngle(this.pose);
+        const values = {
+            px: this.pose[3],
+            py: this.pose[7],
+            pz: this.pose[11],
+            ax: axis[0],
+            ay: axis[1],
+            az: axis[2],
+            "a°": angle,
+        };
+        for (const [name, value] of Object.entries(values)) {
+            const field = this.#fields[name];
+            if (field !== undefined && document.activeElement !== field) {
+                field.value = String(Number((value ?? 0).toPrecision(8)));
+            }
+        }
+        if (document.activeElement !== this.#rows) {
+            const row = (at: number) => Array.from(this.pose.subarray(at, at + 4), String).join("  ");
+            this.#rows.value = [0, 4, 8].map(row).join("\n");
+        }
+    }
+
+    #readFields(): void {
+        const value = (name: string) => Number(this.#fields[name]?.value ?? 0);
+        const [at, axis] = [["px", "py", "pz"].map(value), ["ax", "ay", "az"].map(value)];
+        const angle = value("a°");
+        const place: [number, number, number] = [at[0] ?? 0, at[1] ?? 0, at[2] ?? 0];
+        const known = axisAngle(this.pose);
+        const turned =
+            Math.abs(known.angle - angle) > 1e-6 || axis.some((v, k) => Math.abs(v - (known.axis[k] ?? 0)) > 1e-6);
+        void this.setPose(turned ? fromAxisAngle(axis, angle, place) : placedAt(this.pose, place));
+    }
+
+    #readRows(): void {
+        const numbers = numbersOf(this.#rows.value);
+        if (numbers.length === 12 && numbers.every(Number.isFinite)) {
+            this.#rows.classList.remove("wrong");
+            void this.setPose(Float64Array.from(numbers));
+        } else {
+            this.#rows.classList.add("wrong");
+            this.app.messages.say(`A pose has 12 numbers, found ${numbers.length}.`, "note");
+        }
+    }
+
+    async #measure(): Promise<void> {
+        const { a, b } = this;
+        if (a === undefined || b === undefined) {
+            return;
+        }
+        const { distance, collide } = await this.app.asker.ask("speed", a.side, b.side, this.pose);
+        this.app.measured = { distance, collide };
+        const text = `${countOf(Math.round(distance))} distances, ${countOf(Math.round(collide))} contact tests per second`;
+        fill(this.#speed, this.#speed.firstChild ?? undefined, h("span", {}, text));
+    }
+}
+
+/** The first of some points, or another one if there are none. */
+const firstOf = (points: Float64Array, other: Float64Array): Float64Array =>
+    points.length >= 3 ? points.slice(0, 3) : other;

@@ -1,0 +1,374 @@
+/** Scenes: frames of moving instances with a slider, the pairs that touch, and the nearest pair. Clash reports: a list. */
+
+import type { App } from "./app.js";
+import { Latest } from "./asker.js";
+import type { Body } from "./bodies.js";
+import type { Content, ContentClash, ContentInstance } from "./content.js";
+import { countOf, exact, fact, fill, h, iconButton, milliseconds, pointOf, short } from "./dom.js";
+import { messageOf } from "./errors.js";
+import { Overlay } from "./overlays.js";
+import { part } from "./panel.js";
+import { move, type Pose } from "./pose.js";
+
+type SceneShow = Extract<Content["show"], { kind: "scene" | "clash" }>;
+
+/** Frames per second while the frames play. */
+const RATE = 24;
+/** More pairs than this are not listed. */
+const MAX_LISTED = 400;
+
+export class SceneView {
+    readonly #overlay: Overlay;
+    readonly #pairOverlay: Overlay;
+    readonly #frameBox = h("div", { class: "answer" });
+    readonly #list = h("div", { class: "list", role: "listbox", "aria-label": "Pairs that touch" });
+    readonly #clashBox = h("div");
+    readonly #slider = h("input", {
+        type: "range",
+        min: "0",
+        max: "0",
+        step: "1",
+        value: "0",
+        class: "timeline plain",
+        "aria-label": "Frame",
+    });
+    readonly #number = h("output", { class: "number time" });
+    readonly #play = iconButton("play", "Play or pause (Space)", () => this.toggle());
+    readonly #player = h("div", { class: "player" }, this.#play, this.#slider, this.#number);
+    readonly #filter = h("select", { class: "field", "aria-label": "Class of clashes" });
+    readonly #latest = new Latest();
+    #instances: ContentInstance[] = [];
+    #clashes: ContentClash[] = [];
+    #frames: number[][] = [];
+    #moving: number[] = [];
+    #touching = new Set<number>();
+    #chosen: [number, number] | undefined;
+    #timer = 0;
+
+    constructor(readonly app: App) {
+        this.#overlay = new Overlay(app.stage, 20);
+        this.#pairOverlay = new Overlay(app.stage, 30);
+        const scene = app.panel.add("scene", "Scene");
+        scene.append(this.#frameBox, this.#player, part("Pairs that touch", this.#list));
+        const clash = app.panel.add("clash", "Clashes");
+        clash.append(
+            h("div", { class: "fields" }, h("span", { class: "fields-title" }, "show"), this.#filter),
+            this.#clashBox,
+        );
+        this.#slider.addEventListener("input", () => void this.go(this.#slider.valueAsNumber));
+        this.#filter.addEventListener("change", () => this.#listClashes());
+    }
+
+    get frame(): number {
+        return this.#slider.valueAsNumber;
+    }
+
+    clear(): void {
+        this.stop();
+        this.#overlay.clear();
+        this.#pairOverlay.clear();
+        this.#instances = [];
+        this.#clashes = [];
+        this.#frames = [];
+        this.#touching.clear();
+        this.#chosen = undefined;
+    }
+
+    async set(show: SceneShow): Promise<void> {
+        this.clear();
+        const { app } = this;
+        this.#instances = show.instances;
+        this.#moving = show.instances.flatMap((instance, k) => (instance.moving ? [k] : []));
+        await app.asker.ask(
+            "makeScene",
+            show.instances.map((instance) => ({ ...instance, pose: Float64Array.from(instance.pose) })),
+            show.kind === "scene" ? show.allowed : [],
+        );
+        if (show.kind === "scene") {
+            this.#frames = show.frames;
+            this.#slider.max = String(Math.max(this.#frames.length - 1, 0));
+            this.#player.hidden = this.#frames.length < 2;
+            await this.go(0);
+        } else {
+            this.#clashes = show.clashes;
+            const classes = [...new Set(show.clashes.map((clash) => clash.class))];
+            fill(
+                this.#filter,
+                h("option", { value: "" }, `all ${show.clashes.length}`),
+                ...classes.map((name) => {
+                    const count = show.clashes.filter((clash) => clash.class === name).length;
+                    return h("option", { value: name }, `${name}: ${count}`);
+                }),
+            );
+            this.#listClashes();
+            app.setAnswer({
+                distance: show.clashes.reduce((least, clash) => Math.min(least, clash.distance ?? 0), Number.MAX_VALUE),
+                clashes: show.clashes.length,
+            });
+        }
+    }
+
+    #name(instance: number): string {
+        return this.#instances[instance]?.name || `instance ${instance}`;
+    }
+
+    /** Shows a frame. */
+    go(frame: number): Promise<void> {
+        this.#slider.value = String(frame);
+        this.#number.textContent = `${frame + 1} / ${this.#frames.length}`;
+        const numbers = this.#frames[frame] ?? [];
+        this.#moving.forEach((instance, k) => {
+            const pose = Float64Array.from(numbers.slice(12 * k, 12 * k + 12));
+            if (pose.length === 12) {
+                this.app.bodies[instance]?.setPose(pose);
+            }
+        });
+        this.app.handles.follow();
+        return this.refresh();
+    }
+
+    /** Asks about the poses of all instances again. */
+    refresh(): Promise<void> {
+        const { app } = this;
+        return new Promise((resolve) => {
+            this.#latest.run(async () => {
+                const movable = app.bodies.map((_, k) => k);
+                const poses = Float64Array.from(app.bodies.flatMap((body) => [...body.pose]));
+                try {
+                    const answer = await app.asker.ask("frame", Uint32Array.from(movable), poses);
+                    this.#showFrame(answer);
+                } catch (error) {
+                    fill(this.#frameBox, h("p", { class: "problem" }, messageOf(error)));
+                }
+                resolve();
+            });
+        });
+    }
+
+    #showFrame({ touching, nearest, took }: Awaited<ReturnType<App["askFrame"]>>): void {
+        const { app } = this;
+        const { palette } = app.stage;
+        this.#touching = new Set(touching);
+        this.recolour();
+        this.#overlay.clear();
+        if (nearest !== undefined && nearest.distance > 0) {
+            const ends = [...nearest.pointA, ...nearest.pointB];
+            this.#overlay.segments(ends, palette.near, 3);
+            this.#overlay.dots(ends, palette.near, 11);
+            this.#overlay.label(short(nearest.distance), nearest.pointA, "near");
+        }
+        const pairs = touching.length / 2;
+        app.setAnswer({ distance: nearest?.distance ?? null, touching: pairs, frame: this.frame, took });
+        fill(
+            this.#frameBox,
+            h("div", { class: `relation ${pairs > 0 ? "hit" : "free"}` }, pairs > 0 ? "Touching" : "Apart"),
+            h(
+                "div",
+                { class: "headline" },
+                h(
+                    "span",
+                    { class: "headline-number" },
+                    pairs > 0 ? countOf(pairs) : short(nearest?.distance ?? Number.NaN),
+                ),
+                h(
+                    "span",
+                    { class: "muted" },
+                    pairs > 0 ? (pairs === 1 ? "pair touches" : "pairs touch") : "to the nearest pair",
+                ),
+            ),
+            h(
+                "dl",
+                { class: "facts" },
+                nearest !== undefined && fact("nearest pair", `${this.#name(nearest.a)}, ${this.#name(nearest.b)}`),
+                nearest !== undefined && fact("distance", exact(nearest.distance)),
+                fact("instances", `${countOf(this.#instances.length)}, ${countOf(this.#moving.length)} of which move`),
+                fact("answered in", milliseconds(took)),
+            ),
+        );
+        const rows = Array.from({ length: Math.min(pairs, MAX_LISTED) }, (_, k) => {
+            const [a, b] = [touching[2 * k] ?? 0, touching[2 * k + 1] ?? 0];
+            return this.#row(a, b, "", () => void this.choose(a, b));
+        });
+        fill(this.#list, ...(rows.length > 0 ? rows : [h("p", { class: "muted" }, "None in this frame.")]));
+        if (pairs > MAX_LISTED) {
+            this.#list.append(h("p", { class: "muted" }, `and ${countOf(pairs - MAX_LISTED)} more`));
+        }
+    }
+
+    #row(a: number, b: number, detail: string | HTMLElement, press: () => void): HTMLElement {
+        const isChosen = this.#chosen?.[0] === a && this.#chosen[1] === b;
+        const row = h(
+            "button",
+            {
+                type: "button",
+                class: "list-row",
+                role: "option",
+                "aria-selected": String(isChosen),
+                click: () => {
+                    for (const other of row.parentElement?.querySelectorAll("[aria-selected=true]") ?? []) {
+                        other.setAttribute("aria-selected", "false");
+                    }
+                    row.setAttribute("aria-selected", "true");
+                    press();
+                },
+            },
+            h("span", { class: "list-names" }, `${this.#name(a)} – ${this.#name(b)}`),
+            detail,
+        );
+        return row;
+    }
+
+    /** Colours instances that touch. */
+    recolour(): void {
+        this.app.bodies.forEach((body, k) => {
+            body.setColour(this.colourOf(k));
+        });
+    }
+
+    colourOf(instance: number): number {
+        const { palette } = this.app.stage;
+        if (this.#clashes.length > 0) {
+            const place = this.#chosen?.indexOf(instance) ?? -1;
+            return place === 0 ? palette.a : place === 1 ? palette.b : palette.still;
+        }
+        if (this.#touching.has(instance)) {
+            return palette.hit;
+        }
+        return this.#instances[instance]?.moving === true ? palette.moving : palette.still;
+    }
+
+    /** Frames a pair and shows where it touches. */
+    async choose(a: number, b: number, clash?: ContentClash): Promise<void> {
+        this.#chosen = [a, b];
+        const { app } = this;
+        const [first, second] = [app.bodies[a], app.bodies[b]];
+        if (first === undefined || second === undefined) {
+            return;
+        }
+        const { palette } = app.stage;
+        app.bodies.forEach((body, k) => {
+            const isOne = k === a || k === b;
+            body.setOpacity(isOne ? (clash === undefined ? app.opacity : 0.62) : 0.1);
+        });
+        this.recolour();
+        this.#pairOverlay.clear();
+        const box = app.stage.boxOf([first.group, second.group]);
+        app.stage.fit(box, true);
+        const pose = await app.asker.ask("between", first.pose, second.pose);
+        const near = await app.asker.ask("near", first.side, second.side, pose);
+        const toWorld = (points: ArrayLike<number>) => {
+            const moved: number[] = [];
+            for (let k = 0; k + 2 < points.length; k += 3) {
+                moved.push(...move(first.pose, [points[k] ?? 0, points[k + 1] ?? 0, points[k + 2] ?? 0]));
+            }
+            return moved;
+        };
+        if (near.contacts > 0) {
+            this.#pairOverlay.triangles(first, near.touchingA, palette.hit);
+            this.#pairOverlay.triangles(second, near.touchingB, palette.hit);
+            const deep = await app.asker.ask("deep", first.side, second.side, pose);
+            this.#pairOverlay.segments(toWorld(deep.curves), palette.hit, 2.5, { faint: 0.55 });
+        } else {
+            const ends = toWorld([...near.distance.pointA, ...near.distance.pointB]);
+            this.#pairOverlay.segments(ends, palette.near, 3);
+            this.#pairOverlay.dots(ends, palette.near, 11);
+        }
+        if (clash?.point !== undefined) {
+            this.#pairOverlay.dots(clash.point, palette.depth, 14);
+            if (clash.translation !== undefined) {
+                this.#pairOverlay.arrow(clash.point, clash.translation, palette.depth, 0.01);
+            }
+        }
+    }
+
+    /** Shows all instances alike again. */
+    release(): void {
+        this.#chosen = undefined;
+        this.#pairOverlay.clear();
+        for (const body of this.app.bodies) {
+            body.setOpacity(this.app.opacity);
+        }
+        this.recolour();
+    }
+
+    #listClashes(): void {
+        const shown = this.#clashes.filter((clash) => this.#filter.value === "" || clash.class === this.#filter.value);
+        const rows = shown.slice(0, 2000).map((clash) => {
+            const depth =
+                clash.upper !== undefined
+                    ? `depth ${short(clash.lower ?? 0)} to ${short(clash.upper)}`
+                    : clash.distance !== undefined && clash.distance > 0
+                      ? `${short(clash.distance)} apart`
+                      : "";
+            const detail = h(
+                "span",
+                { class: "list-detail" },
+                h("span", { class: `badge ${clash.class}` }, clash.class),
+                h("span", { class: "muted" }, depth),
+            );
+            return this.#row(clash.a, clash.b, detail, () => {
+                void this.choose(clash.a, clash.b, clash);
+                this.#showClash(clash);
+            });
+        });
+        fill(
+            this.#clashBox,
+            h("div", { class: "list", role: "listbox", "aria-label": "Clashes" }, ...rows),
+            h("div", { class: "clash-facts" }),
+            h("button", { type: "button", class: "button", click: () => this.release() }, "Show all parts"),
+        );
+    }
+
+    #showClash(clash: ContentClash): void {
+        const box = this.#clashBox.querySelector<HTMLElement>(".clash-facts");
+        if (box !== null) {
+            fill(
+                box,
+                h(
+                    "dl",
+                    { class: "facts" },
+                    fact("A", this.#name(clash.a)),
+                    fact("B", this.#name(clash.b)),
+                    clash.upper !== undefined && fact("depth", exact(clash.lower ?? 0), " to ", exact(clash.upper)),
+                    clash.distance !== undefined && clash.distance > 0 && fact("distance", exact(clash.distance)),
+                    clash.point !== undefined && fact("point", pointOf(clash.point)),
+                    clash.translation !== undefined && fact("moves B out", pointOf(clash.translation)),
+                ),
+            );
+        }
+    }
+
+    toggle(): void {
+        if (this.#timer !== 0) {
+            this.stop();
+            return;
+        }
+        if (this.#frames.length < 2) {
+            return;
+        }
+        fill(this.#play, ...iconButton("pause", "", () => {}).childNodes);
+        const step = async () => {
+            const began = performance.now();
+            await this.go((this.frame + 1) % this.#frames.length);
+            if (this.#timer !== 0) {
+                this.#timer = window.setTimeout(
+                    () => void step(),
+                    Math.max(0, 1000 / RATE - (performance.now() - began)),
+                );
+            }
+        };
+        this.#timer = window.setTimeout(() => void step(), 0);
+    }
+
+    stop(): void {
+        clearTimeout(this.#timer);
+        this.#timer = 0;
+        fill(this.#play, ...iconButton("play", "", () => {}).childNodes);
+    }
+
+    /** Moves an instance that the user drags. */
+    moved(body: Body, pose: Pose): void {
+        body.setPose(pose);
+        void this.refresh();
+    }
+}

@@ -1,0 +1,12 @@
+/** Unpacks parts of this page: base64 of gzip, in elements that run no code. */
+
+/** The function that unpacked this code. */
+declare global {
+    interface Window {
+        cbvhUnpack: (id: string) => Promise<ArrayBuffer>;
+    }
+}
+
+export const unpack = (id: string): Promise<ArrayBuffer> => window.cbvhUnpack(id);
+
+export const unpackText = async (id: string): Promise<string> => new TextDecoder().decode(await unpack(id));

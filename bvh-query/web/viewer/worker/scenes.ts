@@ -1,0 +1,77 @@
+/** The scene that the worker holds: instances, frames, and which pairs touch. */
+
+import { Scene } from "../../ts/scene.js";
+import { file } from "./files.js";
+
+/** An instance of the scene. */
+export interface PlacedInstance {
+    name: string;
+    file: number;
+    pose: Float64Array;
+    margin: number;
+    moving: boolean;
+}
+
+/** What is shown of a frame. */
+export interface FrameAnswer {
+    /** Numbers of instances: two for each pair that touches. */
+    touching: Uint32Array;
+    /** The nearest pair: its instances, distance, and closest points in the world. */
+    nearest: { a: number; b: number; distance: number; pointA: Float64Array; pointB: Float64Array } | undefined;
+    took: number;
+}
+
+const [STILL, MOVING] = [1, 2];
+let scene: Scene | undefined;
+
+function current(): Scene {
+    if (scene === undefined) {
+        throw new Error("scene: expected one that was made, found none");
+    }
+    return scene;
+}
+
+/** Makes the scene. Asked are all pairs in which an instance moves, or all if none does. */
+export function make(instances: PlacedInstance[], allowed: [number, number][]): void {
+    scene?.free();
+    scene = new Scene();
+    const anyMoves = instances.some((instance) => instance.moving);
+    for (const { file: number, pose, margin, moving } of instances) {
+        const groups = { member: moving ? MOVING : STILL, meets: moving || !anyMoves ? MOVING | STILL : MOVING };
+        const added = scene.add(file(number).mesh, pose, groups);
+        scene.setMargin(added, margin);
+    }
+    for (const [a, b] of allowed) {
+        scene.setAllowed(a, b);
+    }
+}
+
+/** Moves instances and asks about all pairs. */
+export function frame(instances: Uint32Array, poses: Float64Array): FrameAnswer {
+    const scene = current();
+    const began = performance.now();
+    scene.setPoses(instances, poses);
+    const touching = scene.pairsInContact();
+    const found = scene.distance();
+    const took = performance.now() - began;
+    const nearest = found && {
+        a: found.a,
+        b: found.b,
+        distance: found.nearest.distance,
+        pointA: found.nearest.pointA,
+        pointB: found.nearest.pointB,
+    };
+    return { touching, nearest, took };
+}
+
+/** The first instance that a ray in the world hits. */
+export function hit(origin: Float64Array, direction: Float64Array) {
+    const { instance, hit } = current().firstHits(origin, direction);
+    return {
+        instance: instance[0] ?? -1,
+        t: hit.t[0] ?? 0,
+        point: hit.point,
+        object: hit.object,
+        triangle: hit.triangle,
+    };
+}
