@@ -2,8 +2,9 @@
 
 use crate::answers::{floats, ids};
 use crate::arguments::{Answer, pose, refused, with_querier, wrong};
-use crate::inspect::tree::page;
 use crate::mesh::Mesh;
+use bvh_format::object::Object;
+use bvh_format::page::Page;
 use bvh_format::treelet::Child;
 use bvh_query::{Bvh, Step};
 use js_sys::{Array, Float64Array};
@@ -19,26 +20,28 @@ type Counts = BTreeMap<(u32, u16), u32>;
 /// What was met of one mesh.
 struct Side<'a> {
     bvh: &'a Bvh,
+    /// The object that is walked.
+    object: Option<&'a Object>,
     /// The page and the slot of each opened node; node 0 stands for what is above the root.
     nodes: Vec<Option<(u32, u8)>>,
-    first_page: u32,
     opened: Counts,
     tested: Counts,
 }
 
 impl Side<'_> {
     fn start(&mut self, first_page: u32) {
-        self.first_page = first_page;
+        self.object = self.bvh.objects().iter().find(|object| object.pages().start == first_page);
         self.nodes.clear();
     }
 
     fn open(&mut self, parent: u32, child: u8, node: u32) -> Option<()> {
+        let object = self.object?;
         let at = if parent == 0 {
-            (self.first_page, 0)
+            (object.pages().start, 0)
         } else {
             let (number, slot) = (*self.nodes.get(parent as usize)?)?;
-            let object = self.bvh.objects().iter().find(|object| object.pages().contains(&number))?;
-            let page = page(self.bvh, object, number).ok()?;
+            // The query has checked the page.
+            let page = Page::new(self.bvh.layout().page_bytes(self.bvh.bytes(), number)?, object.profile());
             match page.links(slot).child(child.into()) {
                 Child::Treelet(slot) => (number, slot),
                 Child::Remote(link) => (page.remote(link).page(), page.remote(link).root()),
@@ -81,8 +84,8 @@ pub fn visits(a: &Mesh, b: &Mesh, pose_of_b: &Float64Array, question: &str) -> A
     let stats = asked?;
     let mut sides = shapes.map(|shape| Side {
         bvh: shape.bvh(),
+        object: None,
         nodes: Vec::new(),
-        first_page: 0,
         opened: Counts::new(),
         tested: Counts::new(),
     });

@@ -30,6 +30,13 @@ interface Selection {
     triangle: number;
 }
 
+/** Where a ray hit. */
+interface Hit {
+    point: Float64Array;
+    object: number;
+    triangle: number;
+}
+
 export class App {
     readonly stage: Stage;
     readonly handles: Handles;
@@ -294,10 +301,6 @@ export class App {
         document.documentElement.dataset.answer = JSON.stringify(answer);
     }
 
-    askFrame(instances: Uint32Array, poses: Float64Array) {
-        return this.asker.ask("frame", instances, poses);
-    }
-
     /** Moves a body, and asks again. */
     moveBody(body: Body, pose: Pose): void {
         this.unselect();
@@ -336,7 +339,7 @@ export class App {
         const { origin, direction } = this.stage.rayAt(clientX, clientY);
         const [from, along] = [Float64Array.from(origin), Float64Array.from(direction)];
         try {
-            let nearest: { body: number; t: number; place: number; point: Float64Array } | undefined;
+            let nearest: (Hit & { body: number; t: number; place: number }) | undefined;
             const candidates = await this.#candidates(from, along);
             for (const number of candidates) {
                 const body = this.bodies[number];
@@ -346,14 +349,15 @@ export class App {
                 const { hits, places } = await this.asker.ask("firstHit", body.file, from, along, body.pose);
                 const t = hits.t[0] ?? 0;
                 if (hits.found[0] === 1 && (nearest === undefined || t < nearest.t)) {
-                    nearest = { body: number, t, place: places[0] ?? -1, point: hits.point };
+                    const [object = 0, triangle = 0] = [hits.object[0], hits.triangle[0]];
+                    nearest = { body: number, t, place: places[0] ?? -1, point: hits.point, object, triangle };
                 }
             }
             if (nearest === undefined) {
                 this.unselect();
                 return;
             }
-            await this.select(nearest.body, nearest.place, nearest.point);
+            await this.select(nearest.body, nearest.place, nearest);
         } catch (error) {
             this.messages.say(messageOf(error), "error");
         }
@@ -368,7 +372,7 @@ export class App {
     }
 
     /** Shows a triangle of a body. */
-    async select(number: number, triangle: number, point?: Float64Array): Promise<void> {
+    async select(number: number, triangle: number, hit?: Hit): Promise<void> {
         const body = this.bodies[number];
         if (body === undefined) {
             return;
@@ -396,25 +400,24 @@ export class App {
             this.#selectOverlay.triangles(body, Uint32Array.of(triangle), palette.select, 0.35);
             this.#selectOverlay.segments([...a, ...b, ...b, ...c, ...c, ...a], palette.select, 2.5);
         }
-        if (point !== undefined) {
-            this.#selectOverlay.dots(point, this.stage.palette.select, 9);
+        if (hit !== undefined) {
+            this.#selectOverlay.dots(hit.point, this.stage.palette.select, 9);
         }
+        const id = place?.id ?? hit?.triangle;
+        const object = place?.object ?? hit?.object ?? 0;
+        const { objects } = shown.summary;
         this.#card.hidden = false;
         fill(
             this.#card,
             iconButton("close", "Close (Esc)", () => this.unselect()),
-            h(
-                "div",
-                { class: "card-title" },
-                place === undefined ? body.name : `${body.name}, triangle ${countOf(place.id)}`,
-            ),
+            h("div", { class: "card-title" }, id === undefined ? body.name : `${body.name}, triangle ${countOf(id)}`),
             h(
                 "dl",
                 { class: "facts" },
-                place !== undefined && place.objectName !== "" && fact("object", place.objectName),
-                place !== undefined && shown.summary.objects.length > 1 && fact("object number", String(place.object)),
+                objects[object] !== undefined && objects[object] !== "" && fact("object", objects[object]),
+                objects.length > 1 && fact("object number", String(object)),
                 place !== undefined && fact("leaf packet", `${place.packet} of page ${place.page}`),
-                point !== undefined && fact("point", pointOf(point)),
+                hit !== undefined && fact("point", pointOf(hit.point)),
             ),
         );
     }
@@ -518,9 +521,10 @@ export class App {
     }
 
     setHandleMode(mode: "translate" | "rotate"): void {
+        // The button of the present mode hides the handles.
+        this.handles.isShown = !(this.handles.isShown && this.handles.mode === mode);
         this.handles.mode = mode;
-        this.#tools.get("translate")?.setAttribute("aria-pressed", String(mode === "translate"));
-        this.#tools.get("rotate")?.setAttribute("aria-pressed", String(mode === "rotate"));
+        this.#showTools();
     }
 
     toggleLocal(): void {
@@ -595,17 +599,18 @@ export class App {
         return body.name === "B" ? palette.b : palette.a;
     }
 
+    /** How opaque a body is: in scenes, what moves or touches is seen through the rest. */
+    opacityOf(body: Body): number {
+        const isShownWhole = this.mode === "scene" && !this.scene.isBackground(this.bodies.indexOf(body));
+        return isShownWhole ? 1 : this.opacity;
+    }
+
     #applyLook(): void {
         for (const body of this.bodies) {
-            body.shown.setSmooth(this.#isSmooth);
-        }
-        for (const body of this.bodies) {
             body.setSmooth(this.#isSmooth);
-            body.setOpacity(this.opacity);
+            body.setOpacity(this.opacityOf(body));
             body.setEdges(this.#hasEdges, this.#isDark ? 0x000000 : 0x1b2430);
-            if (!body.mesh.material.vertexColors) {
-                body.setColour(this.colourOf(body));
-            }
+            body.setColour(this.colourOf(body));
         }
         this.#showTools();
     }
@@ -616,8 +621,8 @@ export class App {
             edges: this.#hasEdges,
             smooth: this.#isSmooth,
             grid: this.stage.showsGrid,
-            translate: this.handles.mode === "translate",
-            rotate: this.handles.mode === "rotate",
+            translate: this.handles.isShown && this.handles.mode === "translate",
+            rotate: this.handles.isShown && this.handles.mode === "rotate",
         };
         for (const [name, is] of Object.entries(pressed)) {
             this.#tools.get(name)?.setAttribute("aria-pressed", String(is));
@@ -631,6 +636,8 @@ export class App {
         this.#applyLook();
         if (this.pair.isComplete) {
             void this.pair.refresh();
+        } else if (this.mode === "scene") {
+            this.scene.recolour();
         }
     }
 }

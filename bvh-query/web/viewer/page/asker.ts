@@ -73,23 +73,28 @@ export class Asker {
 
 /** Runs one piece of work at a time, and of those that come meanwhile only the last. */
 export class Latest {
-    #running = false;
-    #next: (() => Promise<void>) | undefined;
+    #isRunning = false;
+    #next: { work: () => Promise<void>; done: () => void } | undefined;
 
-    run(work: () => Promise<void>): void {
-        this.#next = work;
-        if (!this.#running) {
-            void this.#drain();
-        }
+    /** The promise is done when the work is, or when later work has taken its place. */
+    run(work: () => Promise<void>): Promise<void> {
+        this.#next?.done();
+        return new Promise((done) => {
+            this.#next = { work, done };
+            if (!this.#isRunning) {
+                void this.#drain();
+            }
+        });
     }
 
     async #drain(): Promise<void> {
-        this.#running = true;
+        this.#isRunning = true;
         while (this.#next !== undefined) {
-            const work = this.#next;
+            const { work, done } = this.#next;
             this.#next = undefined;
             await work();
+            done();
         }
-        this.#running = false;
+        this.#isRunning = false;
     }
 }

@@ -1,10 +1,12 @@
 /** The meshes on the stage: geometry that is shared by all instances of a file, and bodies that are placed. */
 
 import {
+    BackSide,
     BufferAttribute,
     BufferGeometry,
     DataTexture,
     DoubleSide,
+    FrontSide,
     Group,
     LinearFilter,
     LineBasicMaterial,
@@ -12,6 +14,7 @@ import {
     Mesh,
     MeshMatcapMaterial,
     RGBAFormat,
+    type Side,
     SRGBColorSpace,
 } from "three";
 import type { FileSummary } from "../worker/files.js";
@@ -74,6 +77,7 @@ export class Shown {
     /** The level whose boxes are drawn in place of triangles. */
     boxLevel: number | undefined;
     #smooth: BufferAttribute | undefined;
+    #facing: Side = DoubleSide;
 
     private constructor(
         readonly summary: FileSummary,
@@ -89,6 +93,7 @@ export class Shown {
             const shown = new Shown(summary, centre);
             shown.geometry.setAttribute("position", new BufferAttribute(positions, 3));
             shown.pageStarts = pageStarts;
+            shown.#facing = summary.closed === true ? outside(positions) : DoubleSide;
             shown.geometry.computeBoundingSphere();
             shown.geometry.computeBoundingBox();
             return shown;
@@ -111,6 +116,11 @@ export class Shown {
         return shown;
     }
 
+    /** Which sides of triangles are seen: of a closed mesh, only the outer ones. */
+    get facing(): Side {
+        return this.#facing;
+    }
+
     get positions(): Float32Array {
         return this.geometry.getAttribute("position").array as Float32Array;
     }
@@ -124,19 +134,23 @@ export class Shown {
         return this.positions.subarray(9 * place, 9 * place + 9);
     }
 
-    /** Normals that run over edges flatter than 40 degrees, or none. They are computed when they are first needed. */
-    setSmooth(smooth: boolean): void {
-        if (smooth && this.boxLevel === undefined) {
-            this.#smooth ??= new BufferAttribute(smoothNormals(this.positions), 3, true);
-            this.geometry.setAttribute("normal", this.#smooth);
-        } else {
-            this.geometry.deleteAttribute("normal");
-        }
+    /** Normals that run over edges flatter than 40 degrees. They are computed when they are first needed. */
+    get normals(): BufferAttribute {
+        this.#smooth ??= new BufferAttribute(smoothNormals(this.positions), 3, true);
+        return this.#smooth;
     }
+}
 
-    dispose(): void {
-        this.geometry.dispose();
+/** The side of triangles that is outside of a closed mesh: the sign of its volume tells. */
+function outside(positions: Float32Array): Side {
+    let volume = 0;
+    for (let at = 0; at < positions.length; at += 9) {
+        const p = (k: number) => positions[at + k] ?? 0;
+        volume += p(0) * (p(4) * p(8) - p(5) * p(7));
+        volume += p(1) * (p(5) * p(6) - p(3) * p(8));
+        volume += p(2) * (p(3) * p(7) - p(4) * p(6));
     }
+    return volume < 0 ? BackSide : FrontSide;
 }
 
 /** Computes normals at corners: the mean of those of the triangles there, by area, that are not across a sharp edge. */
@@ -209,8 +223,13 @@ export class Body {
         /** What is added to the radius in questions. */
         readonly margin = 0,
     ) {
-        this.mesh = new Mesh(shown.geometry, material(colour));
-        this.mesh.material.flatShading = !shown.geometry.hasAttribute("normal");
+        // It shares the positions, and has colours of its own.
+        const geometry = new BufferGeometry();
+        geometry.setAttribute("position", shown.geometry.getAttribute("position"));
+        geometry.boundingBox = shown.geometry.boundingBox;
+        geometry.boundingSphere = shown.geometry.boundingSphere;
+        this.mesh = new Mesh(geometry, material(colour));
+        this.mesh.material.side = shown.facing;
         this.group.add(this.mesh);
         stage.scene.add(this.group);
         this.setPose(this.pose);
@@ -231,32 +250,57 @@ export class Body {
     }
 
     setColour(colour: number): void {
+        if (this.isPainted) {
+            return;
+        }
         this.mesh.material.color.setHex(colour);
         this.stage.draw();
     }
 
-    /** Draws the colours of the geometry rather than that of the body. */
-    setPainted(painted: boolean, colour: number): void {
-        this.mesh.material.vertexColors = painted && this.shown.geometry.hasAttribute("color");
-        this.mesh.material.color.setHex(this.mesh.material.vertexColors ? 0xffffff : colour);
-        this.mesh.material.needsUpdate = true;
+    /** Draws a colour for each corner, or one colour. */
+    paint(colours: BufferAttribute | undefined, colour: number): void {
+        const { geometry, material } = this.mesh;
+        if (colours === undefined) {
+            geometry.deleteAttribute("color");
+        } else {
+            geometry.setAttribute("color", colours);
+        }
+        material.vertexColors = colours !== undefined;
+        material.color.setHex(colours === undefined ? colour : 0xffffff);
+        material.needsUpdate = true;
         this.stage.draw();
+    }
+
+    get isPainted(): boolean {
+        return this.mesh.material.vertexColors;
     }
 
     setOpacity(opacity: number): void {
         const { material } = this.mesh;
+        if (material.opacity === opacity) {
+            return;
+        }
         material.opacity = opacity;
         material.transparent = opacity < 1;
         material.depthWrite = opacity > 0.9;
+        // Through what is transparent, the far side is seen as well.
+        material.side = opacity < 1 ? DoubleSide : this.shown.facing;
         material.needsUpdate = true;
         this.mesh.renderOrder = opacity < 1 ? 1 : 0;
         this.stage.draw();
     }
 
-    /** Adopts whether the geometry has normals. */
+    /** Smooths over edges, or shows each triangle flat. */
     setSmooth(smooth: boolean): void {
-        this.mesh.material.flatShading = !smooth || this.shown.boxLevel !== undefined;
-        this.mesh.material.needsUpdate = true;
+        const { geometry, material } = this.mesh;
+        const isSmooth = smooth && this.shown.boxLevel === undefined;
+        if (isSmooth) {
+            geometry.setAttribute("normal", this.shown.normals);
+        } else {
+            geometry.deleteAttribute("normal");
+        }
+        material.flatShading = !isSmooth;
+        material.needsUpdate = true;
         this.stage.draw();
     }
 
@@ -297,6 +341,7 @@ export class Body {
 
     remove(): void {
         this.#wires?.geometry.dispose();
+        this.mesh.geometry.dispose();
         this.group.removeFromParent();
         this.mesh.material.dispose();
     }

@@ -118,5 +118,6 @@ export function bytesOf(count: number): string {
 /** A count with thin gaps between thousands. */
 export const countOf = (count: number): string => String(count).replace(/\B(?=(\d{3})+$)/g, "\u202f");
 
+/** A time. Browsers round it to a tenth of a millisecond. */
 export const milliseconds = (value: number): string =>
-    value < 0.995 ? `${Math.max(value * 1000, 0).toPrecision(3)} µs` : `${value.toPrecision(3)} ms`;
+    value < 0.1 ? "less than 0.1 ms" : `${value.toPrecision(value < 10 ? 2 : 3)} ms`;

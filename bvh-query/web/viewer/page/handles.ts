@@ -15,7 +15,8 @@ export class Handles {
 
     constructor(readonly stage: Stage) {
         this.#controls = new TransformControls(stage.camera, stage.canvas);
-        this.#controls.size = 0.8;
+        this.#controls.size = 0.75;
+        this.#controls.setColors(0xe5484d, 0x2f9e63, 0x3b7ddd, 0xf2c037);
         stage.scene.add(this.#pivot, this.#controls.getHelper());
         this.#controls.addEventListener("change", () => stage.draw());
         this.#controls.addEventListener("dragging-changed", ({ value }) => {
@@ -45,6 +46,7 @@ export class Handles {
             this.follow();
             this.#controls.attach(this.#pivot);
         }
+        this.#controls.getHelper().visible = this.isShown && body !== undefined;
         this.stage.draw();
     }
 
@@ -91,9 +93,13 @@ export class Handles {
         this.stage.draw();
     }
 
+    get isShown(): boolean {
+        return this.#controls.enabled;
+    }
+
     set isShown(shown: boolean) {
         this.#controls.enabled = shown;
-        this.#controls.getHelper().visible = shown;
+        this.#controls.getHelper().visible = shown && this.#body !== undefined;
         this.stage.draw();
     }
 }

@@ -333,7 +333,6 @@ export class Inside {
             return;
         }
         const number = ++this.#asked;
-        body.setOpacity(slabs === "none" ? this.app.opacity : Math.min(this.app.opacity, 0.55));
         if (slabs === "none") {
             this.#clearNodes();
             fill(this.#nodesBox);
@@ -459,14 +458,17 @@ export class Inside {
             );
             this.#showVisits(this.#visits, performance.now() - began);
         }
-        const seen = new Set<number>();
+        const known = new Map<number, BufferAttribute>();
         for (const body of this.#bodies()) {
-            const { shown } = body;
-            if (paint !== "plain" && shown.boxLevel === undefined && (paint === "visits" || !seen.has(body.file))) {
-                seen.add(body.file);
-                await this.#paintGeometry(body, paint);
+            if (paint === "plain" || body.shown.boxLevel !== undefined) {
+                body.paint(undefined, this.app.colourOf(body));
+                continue;
             }
-            body.setPainted(paint !== "plain", this.app.colourOf(body));
+            // What is counted differs between both sides of a question, even if they are one file.
+            const colours =
+                (paint === "visits" ? undefined : known.get(body.file)) ?? (await this.#coloursOf(body, paint));
+            known.set(body.file, colours);
+            body.paint(colours, this.app.colourOf(body));
         }
         if (this.#polyhedra !== undefined) {
             const { faces, edges } = this.#nodeColours(this.#polyhedra);
@@ -477,7 +479,7 @@ export class Inside {
         this.app.stage.draw();
     }
 
-    async #paintGeometry(body: Body, paint: Paint): Promise<void> {
+    async #coloursOf(body: Body, paint: Paint): Promise<BufferAttribute> {
         const { shown } = body;
         const colours = new Uint8Array(9 * shown.triangles);
         const colour = new Color();
@@ -520,7 +522,7 @@ export class Inside {
                 );
             });
         }
-        shown.geometry.setAttribute("color", new BufferAttribute(colours, 3, true));
+        return new BufferAttribute(colours, 3, true);
     }
 
     #showVisits(visits: Visits, took: number): void {
@@ -529,7 +531,7 @@ export class Inside {
             for (let k = 2; k < rows.length; k += 3) {
                 total += rows[k] ?? 0;
             }
-            return `${countOf(rows.length / 3)}, ${countOf(total)} times`;
+            return `${countOf(rows.length / 3)} of them, ${countOf(total)} times`;
         };
         fill(
             this.#visitsBox,
@@ -547,10 +549,10 @@ export class Inside {
                 fact("node tests", `${countOf(visits.nodeTests)} of up to 16 pairs`),
                 fact("packet tests", `${countOf(visits.packetTests)} of up to 16 pairs of triangles`),
                 fact("exact tests", countOf(visits.exactTests)),
-                fact("treelets of A opened", sum(visits.a.treelets)),
-                fact("treelets of B opened", sum(visits.b.treelets)),
-                fact("packets of A met", sum(visits.a.packets)),
-                fact("packets of B met", sum(visits.b.packets)),
+                fact("A: treelets", sum(visits.a.treelets)),
+                fact("B: treelets", sum(visits.b.treelets)),
+                fact("A: packets", sum(visits.a.packets)),
+                fact("B: packets", sum(visits.b.packets)),
                 fact("recorded in", milliseconds(took)),
             ),
         );

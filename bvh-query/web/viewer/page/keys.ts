@@ -57,8 +57,18 @@ function nudge(app: App, event: KeyboardEvent, step: number): void {
 }
 
 const KEYS: Key[] = [
-    { name: "T", does: "move B with the handles", is: plain("t"), run: (app) => app.setHandleMode("translate") },
-    { name: "R", does: "turn B with the handles", is: plain("r"), run: (app) => app.setHandleMode("rotate") },
+    {
+        name: "T",
+        does: "move B with the handles, or hide them",
+        is: plain("t"),
+        run: (app) => app.setHandleMode("translate"),
+    },
+    {
+        name: "R",
+        does: "turn B with the handles, or hide them",
+        is: plain("r"),
+        run: (app) => app.setHandleMode("rotate"),
+    },
     { name: "L", does: "handles along the axes of A or of B", is: plain("l"), run: (app) => app.toggleLocal() },
     {
         name: "Alt + arrows, Page Up, Page Down",

@@ -41,7 +41,11 @@ export function stateOf(app: App): string {
 export async function restore(app: App): Promise<void> {
     const parameters = new URLSearchParams(location.hash.slice(1));
     const numbers = (name: string, count: number) => {
-        const found = (parameters.get(name) ?? "").split(",").map(Number);
+        const text = parameters.get(name);
+        if (text === null || text === "") {
+            return undefined;
+        }
+        const found = text.split(",").map(Number);
         return found.length === count && found.every(Number.isFinite) ? Float64Array.from(found) : undefined;
     };
     const up = parameters.get("up");
@@ -93,7 +97,7 @@ export function command(app: App): string {
     const { motion } = app.motion;
     if (app.panel.current === "motion" && motion !== undefined) {
         const clearance = app.motion.clearance > 0 ? ` --clearance ${app.motion.clearance}` : "";
-        return `cbvh motion ${path(a.file)} ${path(b.file)} --motion "${words(motion)}"${clearance}`;
+        return `echo "${words(motion)}" | cbvh motion ${path(a.file)} ${path(b.file)} /dev/stdin${clearance}`;
     }
     const touches = app.pair.near?.distance.distance === 0;
     const mode = touches ? "contacts" : "distance";

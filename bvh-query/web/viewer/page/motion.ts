@@ -94,6 +94,7 @@ export class MotionView {
     }
 
     #showNothing(): void {
+        this.#slider.classList.add("plain");
         fill(this.#answerBox, h("p", { class: "muted" }, "No motion yet. Set its start and its end below."));
     }
 
@@ -166,7 +167,7 @@ export class MotionView {
             h(
                 "dl",
                 { class: "facts" },
-                fact("certainly free until", "t = ", exact(freeUntil)),
+                fact("certainly free", "until t = ", exact(freeUntil)),
                 kind !== 0 && fact("first hit", "t = ", exact(at)),
                 nearest !== undefined && fact("point on A", pointOf(nearest.pointA)),
                 nearest !== undefined && fact("triangles", `${nearest.triangleA} of A, ${nearest.triangleB} of B`),
@@ -179,7 +180,7 @@ export class MotionView {
         const style = this.#slider.style;
         style.setProperty("--free", percent(freeUntil));
         style.setProperty("--hit", percent(kind === 0 ? 1 : at));
-        this.#slider.classList.toggle("has-hit", kind !== 0);
+        this.#slider.classList.remove("plain");
     }
 
     async #drawPath(b: Body, motion: Float64Array, answer: MotionAnswer): Promise<void> {
@@ -207,7 +208,7 @@ export class MotionView {
         }
         ends.forEach((_, k) => {
             const ghost = new Mesh(
-                b.shown.geometry,
+                b.mesh.geometry,
                 material(k === 2 ? palette.hit : palette.b, { transparent: true, opacity: 0.16 }),
             );
             ghost.material.depthWrite = false;

@@ -135,7 +135,7 @@ export class Overlay {
         const material = new PointsMaterial({
             color: colour,
             map: dot(),
-            size: size * Math.min(window.devicePixelRatio, 2),
+            size,
             sizeAttenuation: false,
             transparent: true,
             alphaTest: 0.4,

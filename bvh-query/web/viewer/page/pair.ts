@@ -11,6 +11,8 @@ import { part } from "./panel.js";
 import { axisAngle, fromAxisAngle, identity, numbersOf, type Pose, placedAt, position, words } from "./pose.js";
 
 const RELATIONS = ["Touching", "Apart", "A is inside B", "B is inside A", "Partly inside", "Apart"] as const;
+/** More normals than this are not drawn: those of the largest patches are. */
+const MAX_ARROWS = 24;
 /** How long the pose stays before what takes longer is asked, in milliseconds. */
 const PAUSE = 90;
 
@@ -110,14 +112,11 @@ export class Pair {
     refresh(): Promise<void> {
         clearTimeout(this.#timer);
         const number = ++this.#asked;
-        return new Promise((resolve) => {
-            this.#latest.run(async () => {
-                await this.#ask(this.pose);
-                resolve();
-                if (number === this.#asked) {
-                    this.#timer = window.setTimeout(() => this.#latest.run(() => this.#askMore(number)), PAUSE);
-                }
-            });
+        return this.#latest.run(async () => {
+            await this.#ask(this.pose);
+            if (number === this.#asked) {
+                this.#timer = window.setTimeout(() => void this.#latest.run(() => this.#askMore(number)), PAUSE);
+            }
         });
     }
 
@@ -130,7 +129,7 @@ export class Pair {
             const near = await this.app.asker.ask("near", a.side, b.side, pose, this.within);
             this.near = near;
             this.deep = undefined;
-            this.#showNear(near, pose);
+            this.#showNear(near);
             this.app.setAnswer({
                 distance: near.distance.distance,
                 lower: near.distance.lower,
@@ -167,7 +166,7 @@ export class Pair {
         }
     }
 
-    #showNear(near: NearAnswer, pose: Pose): void {
+    #showNear(near: NearAnswer): void {
         const { a, b } = this;
         if (a === undefined || b === undefined) {
             return;
@@ -222,7 +221,7 @@ export class Pair {
                         ),
                     ),
                 near.within !== undefined && fact(`within ${this.within}`, near.within ? "yes" : "no"),
-                touches && fact("pairs of triangles", countOf(near.contacts)),
+                touches && fact("contacts", `${countOf(near.contacts)} pairs of triangles`),
                 fact("point on A", pointOf(distance.pointA)),
                 fact("point on B", pointOf(distance.pointB)),
                 fact("triangle of A", summary(a, distance.objectA, distance.triangleA)),
@@ -232,7 +231,6 @@ export class Pair {
                 fact("answered in", `${milliseconds(near.distanceTook)} (distance), ${milliseconds(near.took)} (all)`),
             ),
         );
-        void pose;
         const isApart = !touches && kind === "free";
         fill(this.#depth, h("p", { class: "muted" }, isApart ? "The meshes are apart." : "…"));
     }
@@ -244,9 +242,9 @@ export class Pair {
         this.#deepOverlay.clear();
         this.#deepOverlay.segments(deep.curves, palette.hit, 2.5, { faint: 0.55 });
         const size = this.app.size;
-        for (let k = 0; k < deep.centres.length; k += 3) {
+        for (let k = 0; k < Math.min(deep.centres.length, 3 * MAX_ARROWS); k += 3) {
             const normal = deep.normals.subarray(k, k + 3);
-            const length = 0.07 * size;
+            const length = 0.05 * size;
             this.#deepOverlay.arrow(
                 deep.centres.subarray(k, k + 3),
                 Array.from(normal, (value) => value * length),
@@ -254,7 +252,7 @@ export class Pair {
                 0.005,
             );
         }
-        const rows: (HTMLElement | false)[] = [fact("contact patches", countOf(deep.patches))];
+        const rows: (HTMLElement | false)[] = [fact("patches", countOf(deep.patches))];
         if (typeof depth === "string") {
             rows.unshift(fact("depth", h("span", { class: "muted" }, depth)));
         } else {
@@ -302,6 +300,8 @@ export class Pair {
         };
         const row = (title: string, ...fields: HTMLElement[]) =>
             h("div", { class: "fields" }, h("span", { class: "fields-title" }, title), ...fields);
+        const above = (title: string, ...fields: HTMLElement[]) =>
+            h("div", {}, h("div", { class: "fields-title" }, title), h("div", { class: "fields" }, ...fields));
         this.#rows.addEventListener("change", () => this.#readRows());
         const home = h(
             "button",
@@ -316,8 +316,8 @@ export class Pair {
         return h(
             "div",
             {},
-            row("position", field("px", "Position, x"), field("py", "Position, y"), field("pz", "Position, z")),
-            row("axis", field("ax", "Axis, x"), field("ay", "Axis, y"), field("az", "Axis, z")),
+            above("position", field("px", "Position, x"), field("py", "Position, y"), field("pz", "Position, z")),
+            above("axis of the rotation", field("ax", "Axis, x"), field("ay", "Axis, y"), field("az", "Axis, z")),
             row("angle", field("a°", "Angle in degrees")),
             h("div", { class: "fields-title" }, "rows of the 3 by 4 matrix"),
             this.#rows,
@@ -339,7 +339,7 @@ export class Pair {
         for (const [name, value] of Object.entries(values)) {
             const field = this.#fields[name];
             if (field !== undefined && document.activeElement !== field) {
-                field.value = String(Number((value ?? 0).toPrecision(8)));
+                field.value = String(Number((value ?? 0).toPrecision(7)));
             }
         }
         if (document.activeElement !== this.#rows) {

@@ -1,5 +1,6 @@
 /** Scenes: frames of moving instances with a slider, the pairs that touch, and the nearest pair. Clash reports: a list. */
 
+import type { FrameAnswer } from "../worker/scenes.js";
 import type { App } from "./app.js";
 import { Latest } from "./asker.js";
 import type { Body } from "./bodies.js";
@@ -114,6 +115,9 @@ export class SceneView {
 
     /** Shows a frame. */
     go(frame: number): Promise<void> {
+        if (this.#chosen !== undefined) {
+            this.release();
+        }
         this.#slider.value = String(frame);
         this.#number.textContent = `${frame + 1} / ${this.#frames.length}`;
         const numbers = this.#frames[frame] ?? [];
@@ -130,22 +134,18 @@ export class SceneView {
     /** Asks about the poses of all instances again. */
     refresh(): Promise<void> {
         const { app } = this;
-        return new Promise((resolve) => {
-            this.#latest.run(async () => {
-                const movable = app.bodies.map((_, k) => k);
-                const poses = Float64Array.from(app.bodies.flatMap((body) => [...body.pose]));
-                try {
-                    const answer = await app.asker.ask("frame", Uint32Array.from(movable), poses);
-                    this.#showFrame(answer);
-                } catch (error) {
-                    fill(this.#frameBox, h("p", { class: "problem" }, messageOf(error)));
-                }
-                resolve();
-            });
+        return this.#latest.run(async () => {
+            const movable = Uint32Array.from(app.bodies, (_, k) => k);
+            const poses = Float64Array.from(app.bodies.flatMap((body) => [...body.pose]));
+            try {
+                this.#showFrame(await app.asker.ask("frame", movable, poses));
+            } catch (error) {
+                fill(this.#frameBox, h("p", { class: "problem" }, messageOf(error)));
+            }
         });
     }
 
-    #showFrame({ touching, nearest, took }: Awaited<ReturnType<App["askFrame"]>>): void {
+    #showFrame({ touching, nearest, took }: FrameAnswer): void {
         const { app } = this;
         const { palette } = app.stage;
         this.#touching = new Set(touching);
@@ -222,14 +222,25 @@ export class SceneView {
     recolour(): void {
         this.app.bodies.forEach((body, k) => {
             body.setColour(this.colourOf(k));
+            if (this.#chosen === undefined) {
+                body.setOpacity(this.app.opacityOf(body));
+            }
         });
+    }
+
+    /** Whether an instance neither moves nor touches another one. */
+    isBackground(instance: number): boolean {
+        return this.#instances[instance]?.moving !== true && !this.#touching.has(instance);
     }
 
     colourOf(instance: number): number {
         const { palette } = this.app.stage;
+        const place = this.#chosen?.indexOf(instance) ?? -1;
+        if (place >= 0) {
+            return place === 0 ? palette.a : palette.b;
+        }
         if (this.#clashes.length > 0) {
-            const place = this.#chosen?.indexOf(instance) ?? -1;
-            return place === 0 ? palette.a : place === 1 ? palette.b : palette.still;
+            return palette.still;
         }
         if (this.#touching.has(instance)) {
             return palette.hit;
@@ -248,7 +259,7 @@ export class SceneView {
         const { palette } = app.stage;
         app.bodies.forEach((body, k) => {
             const isOne = k === a || k === b;
-            body.setOpacity(isOne ? (clash === undefined ? app.opacity : 0.62) : 0.1);
+            body.setOpacity(isOne ? (clash === undefined ? 1 : 0.62) : 0.08);
         });
         this.recolour();
         this.#pairOverlay.clear();
@@ -286,7 +297,7 @@ export class SceneView {
         this.#chosen = undefined;
         this.#pairOverlay.clear();
         for (const body of this.app.bodies) {
-            body.setOpacity(this.app.opacity);
+            body.setOpacity(this.app.opacityOf(body));
         }
         this.recolour();
     }

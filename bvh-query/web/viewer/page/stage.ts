@@ -6,17 +6,23 @@
  */
 
 import {
-    AxesHelper,
     Box3,
+    CanvasTexture,
+    ConeGeometry,
+    CylinderGeometry,
     GridHelper,
     Group,
     Matrix4,
+    Mesh,
+    MeshBasicMaterial,
     type Object3D,
     PerspectiveCamera,
     type Quaternion,
     Raycaster,
     Scene,
-    Sphere,
+    Sprite,
+    SpriteMaterial,
+    SRGBColorSpace,
     Vector2,
     Vector3,
     WebGLRenderer,
@@ -24,6 +30,38 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { type Palette, palette } from "./colours.js";
 import type { Point, Pose } from "./pose.js";
+
+/** The axes of the corner: an arrow and a letter for each. */
+function axes(): Object3D[] {
+    const names = ["x", "y", "z"] as const;
+    const colours = [0xe5484d, 0x2f9e63, 0x3b7ddd];
+    return names.flatMap((name, axis) => {
+        const material = new MeshBasicMaterial({ color: colours[axis] ?? 0 });
+        const shaft = new Mesh(new CylinderGeometry(0.045, 0.045, 0.75, 10), material);
+        shaft.position.y = 0.375;
+        const tip = new Mesh(new ConeGeometry(0.13, 0.3, 16), material);
+        tip.position.y = 0.85;
+        const arrow = new Group();
+        arrow.add(shaft, tip);
+        arrow.rotation.set(axis === 2 ? Math.PI / 2 : 0, 0, axis === 0 ? -Math.PI / 2 : 0);
+        const canvas = document.createElement("canvas");
+        canvas.width = canvas.height = 128;
+        const context = canvas.getContext("2d");
+        if (context !== null) {
+            context.font = "700 104px system-ui, sans-serif";
+            context.textAlign = "center";
+            context.textBaseline = "middle";
+            context.fillStyle = `#${(colours[axis] ?? 0).toString(16).padStart(6, "0")}`;
+            context.fillText(name, 64, 64);
+        }
+        const map = new CanvasTexture(canvas);
+        map.colorSpace = SRGBColorSpace;
+        const letter = new Sprite(new SpriteMaterial({ map, depthTest: false }));
+        letter.scale.setScalar(0.42);
+        letter.position.setComponent(axis, 1.3);
+        return [arrow, letter];
+    });
+}
 
 /** A label that stays at a place of the stage. */
 interface Label {
@@ -78,7 +116,7 @@ export class Stage {
         this.orbit.zoomToCursor = true;
         this.orbit.addEventListener("change", () => this.draw());
         this.scene.add(this.#frame);
-        this.#triad.add(new AxesHelper(1));
+        this.#triad.add(...axes());
         new ResizeObserver(() => this.#resize(host)).observe(host);
         this.#resize(host);
         this.canvas.addEventListener("webglcontextrestored", () => this.draw());
@@ -186,20 +224,34 @@ export class Stage {
         if (box.isEmpty()) {
             return;
         }
-        const sphere = box.getBoundingSphere(new Sphere());
-        const radius = Math.max(sphere.radius, 1e-6);
-        const angle = (this.camera.fov * Math.PI) / 360;
-        const narrow = Math.min(angle, Math.atan(Math.tan(angle) * this.camera.aspect));
+        const centre = box.getCenter(new Vector3());
         const away = this.camera.position.clone().sub(this.orbit.target);
         if (away.lengthSq() === 0) {
             away.set(1, -1, 1);
         }
-        const position = sphere.center.clone().addScaledVector(away.normalize(), (1.04 * radius) / Math.sin(narrow));
+        away.normalize();
+        // Each corner of the box must be within the picture: it decides how far away the camera is at least.
+        const right = new Vector3().crossVectors(this.camera.up, away).normalize();
+        const above = new Vector3().crossVectors(away, right);
+        const upright = Math.tan((this.camera.fov * Math.PI) / 360);
+        const margin = 0.86;
+        let distance = 1e-6;
+        for (let corner = 0; corner < 8; corner++) {
+            const offset = new Vector3(
+                corner & 1 ? box.max.x : box.min.x,
+                corner & 2 ? box.max.y : box.min.y,
+                corner & 4 ? box.max.z : box.min.z,
+            ).sub(centre);
+            const sideways = Math.abs(offset.dot(right)) / (upright * this.camera.aspect * margin);
+            const upwards = Math.abs(offset.dot(above)) / (upright * margin);
+            distance = Math.max(distance, offset.dot(away) + Math.max(sideways, upwards));
+        }
+        const position = centre.clone().addScaledVector(away, distance);
         if (smooth) {
-            this.#fly(position, sphere.center);
+            this.#fly(position, centre);
         } else {
             this.camera.position.copy(position);
-            this.orbit.target.copy(sphere.center);
+            this.orbit.target.copy(centre);
             this.orbit.update();
         }
         this.draw();
@@ -335,9 +387,9 @@ export class Stage {
 
     /** Draws the axes in a corner. */
     #drawTriad(size: Vector2): void {
-        const side = 72;
+        const side = 84;
         const away = this.camera.position.clone().sub(this.orbit.target).normalize();
-        this.#triadCamera.position.copy(away.multiplyScalar(4.2));
+        this.#triadCamera.position.copy(away.multiplyScalar(5.6));
         this.#triadCamera.up.copy(this.camera.up);
         this.#triadCamera.lookAt(0, 0, 0);
         this.#renderer.setViewport(8, 8, side, side);

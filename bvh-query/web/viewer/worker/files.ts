@@ -36,7 +36,6 @@ export interface Triangles {
 /** Where a triangle is stored. */
 export interface Place {
     object: number;
-    objectName: string;
     id: number;
     page: number;
     packet: number;
@@ -203,7 +202,6 @@ export class LoadedFile {
         const object = objects.findIndex(({ firstPage, pages }) => page >= firstPage && page < firstPage + pages);
         return {
             object,
-            objectName: objects[object]?.name ?? "",
             id: this.#ids?.[place] ?? 0,
             page,
             packet: this.#packets[place] ?? 0,

@@ -1,0 +1,600 @@
+/**
+ * Opens filled pages in headless Chromium, from files, as a user does. Answers are compared with those of the command, whose path
+ * is in CBVH. CHROMIUM names the browser, and CBVH_PICTURES a folder for pictures of the page.
+ */
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import test, { after } from "node:test";
+import { pathToFileURL } from "node:url";
+import { gunzipSync } from "node:zlib";
+import { chromium } from "playwright-core";
+import { ROOT } from "../../tests/files.js";
+import { filled, MARK, template } from "./fill.js";
+import { box, overlaps, ring, scene } from "./meshes.js";
+
+const COMMAND = process.env.CBVH;
+const WITHOUT = COMMAND === undefined && "CBVH names no command";
+const MAX_BYTES = 1_500_000;
+const folder = mkdtempSync(path.join(os.tmpdir(), "cbvh-page-"));
+const pictures = process.env.CBVH_PICTURES;
+if (pictures !== undefined) {
+    mkdirSync(pictures, { recursive: true });
+}
+
+/** A graphics card in software, so that pages are drawn on any machine. */
+const GRAPHICS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
+const launch = (graphics) =>
+    chromium.launch({
+        executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+        args: ["--no-sandbox", "--disable-background-networking", ...graphics],
+    });
+const browser = await launch(GRAPHICS);
+after(async () => {
+    await browser.close();
+    rmSync(folder, { recursive: true });
+});
+
+const testdata = (name) => readFileSync(path.join(ROOT, "testdata", name));
+
+/** What the command prints. */
+const command = (...words) =>
+    execFileSync(COMMAND, words.map(String), { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"] });
+
+const written = (name, text) => {
+    const file = path.join(folder, name);
+    writeFileSync(file, text);
+    return file;
+};
+
+/** Bakes the text of a mesh file with the command. */
+function baked(name, text, ...options) {
+    const out = path.join(folder, `${name}.cbvh`);
+    if (!existsSync(out)) {
+        command("bake", written(name, text), "-o", out, ...options);
+    }
+    return readFileSync(out);
+}
+
+let opened = 0;
+
+/** Opens a page from a file, and waits until it is drawn or refuses. */
+async function open(
+    html,
+    { size = { width: 1280, height: 800 }, prepare, hash = "", dark = false, from = browser } = {},
+) {
+    const context = await from.newContext({
+        viewport: size,
+        colorScheme: dark ? "dark" : "light",
+        acceptDownloads: true,
+    });
+    const page = await context.newPage();
+    page.setDefaultTimeout(120_000);
+    const [errors, requests] = [[], []];
+    page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
+    page.on("pageerror", (error) => errors.push(String(error)));
+    page.on("request", (request) => requests.push(request.url()));
+    if (prepare !== undefined) {
+        await page.addInitScript(prepare);
+    }
+    const file = written(`page-${opened++}.html`, html);
+    await page.goto(pathToFileURL(file).href + hash);
+    await page.waitForSelector('html:not([data-state="loading"])', { timeout: 120_000 });
+    const close = async () => {
+        const strange = requests.filter((url) => !/^(file|blob|data):/.test(url));
+        assert.deepEqual(strange, [], "the page asked the network");
+        await context.close();
+    };
+    return { page, errors, close };
+}
+
+const state = (page) => page.getAttribute("html", "data-state");
+const answer = async (page) => JSON.parse(await page.getAttribute("html", "data-answer"));
+
+/** Waits until the answer is another one. */
+const changed = (page, before) =>
+    page.waitForFunction((before) => document.documentElement.dataset.answer !== before, before, { timeout: 60_000 });
+
+async function picture(page, name) {
+    if (pictures !== undefined) {
+        await page.waitForTimeout(800);
+        await page.screenshot({ path: path.join(pictures, `${name}.png`) });
+    }
+}
+
+const RING = () => baked("ring.obj", ring(64, 32));
+const BOX = () => baked("box.obj", box());
+const BESIDE = [1, 0, 0, 4.5, 0, 1, 0, 0.25, 0, 0, 1, 0.125];
+const pair = (pose = BESIDE, more = {}) =>
+    filled(
+        [
+            ["ring.cbvh", RING()],
+            ["box.cbvh", BOX()],
+        ],
+        { kind: "pair", pose, ...more },
+    );
+
+test("the template is one small file with one place for content", () => {
+    const html = template();
+    assert.ok(html.length < MAX_BYTES, `${html.length} bytes`);
+    assert.equal(html.split("\n").filter((line) => line === MARK).length, 1);
+    assert.doesNotMatch(html, /(src|href)="(?!data:)/);
+});
+
+/** What is packed in a part of a page. */
+function part(html, id) {
+    const [, text] = new RegExp(`id="${id}">([^<]*)<`).exec(html);
+    return gunzipSync(Buffer.from(text, "base64"));
+}
+
+test("the committed page is that of these sources", { skip: process.env.CBVH_PAGE === undefined }, () => {
+    const committed = readFileSync(path.join(ROOT, "bvh-query/view/page.html"), "utf8");
+    for (const id of ["cbvh-main", "cbvh-worker"]) {
+        assert.ok(part(committed, id).equals(part(template(), id)), `${id} differs: run bvh-query/web/viewer/build`);
+    }
+    const around = (html) => html.replace(/(<script type="text\/plain" id="[^"]*">)[^<]*/g, "$1");
+    assert.equal(around(committed), around(template()));
+});
+
+test("the template alone invites to drop files", async () => {
+    const { page, errors, close } = await open(template());
+    assert.equal(await state(page), "ready");
+    assert.ok(await page.isVisible("text=Drop a mesh here"));
+    assert.deepEqual(errors, []);
+    await picture(page, "empty");
+    await close();
+});
+
+test("distances have the bits of the command, in 20 poses", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair());
+    assert.equal(await state(page), "ready");
+    const poses = overlaps(20);
+    const [a, b] = [path.join(folder, "ring.obj.cbvh"), path.join(folder, "box.obj.cbvh")];
+    const rows = written("poses.txt", poses.map((pose) => `${pose.join(" ")}\n`).join(""));
+    const records = command("query", a, b, rows, "--mode", "distance", "--json").trim().split("\n").map(JSON.parse);
+    assert.equal(records.length, 20);
+    let touching = 0;
+    for (const [k, pose] of poses.entries()) {
+        await page.fill('textarea[aria-label="Twelve numbers of the pose"]', pose.join(" "));
+        await page.locator('textarea[aria-label="Twelve numbers of the pose"]').blur();
+        await page.waitForFunction(
+            (pose) => JSON.parse(document.documentElement.dataset.answer).pose.join() === pose,
+            pose.join(),
+        );
+        const found = await answer(page);
+        assert.equal(found.distance, records[k].distance);
+        assert.equal(found.lower, records[k].lower);
+        assert.equal(found.upper, records[k].upper);
+        touching += found.contacts > 0 ? 1 : 0;
+    }
+    assert.ok(touching > 2 && touching < 18, `${touching} of 20 poses touch`);
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("B is dragged with the mouse, by its handle", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair());
+    const before = await page.getAttribute("html", "data-answer");
+    const [x, y] = await page.evaluate(() => {
+        const { stage, pair } = window.cbvhView;
+        const [px, py, pz] = [3, 7, 11].map((k) => pair.pose[k]);
+        const at = stage.toStage([px, py, pz]).project(stage.camera);
+        const { left, top, width, height } = stage.canvas.getBoundingClientRect();
+        return [left + ((at.x + 1) / 2) * width, top + ((1 - at.y) / 2) * height];
+    });
+    await page.mouse.move(x, y);
+    await page.waitForTimeout(100);
+    await page.mouse.down();
+    await page.mouse.move(x - 60, y + 12, { steps: 5 });
+    await page.mouse.up();
+    await changed(page, before);
+    const [from, to] = [JSON.parse(before), await answer(page)];
+    assert.notDeepEqual(to.pose, from.pose);
+    // The rotation keeps its bits.
+    [0, 1, 2, 4, 5, 6, 8, 9, 10].forEach((place) => {
+        assert.equal(to.pose[place], from.pose[place]);
+    });
+    assert.notEqual(to.distance, from.distance);
+    assert.deepEqual(errors, []);
+    await picture(page, "distance");
+    await close();
+});
+
+test("keys move B, turn the view and list themselves", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair());
+    await page.focus("canvas");
+    let before = await page.getAttribute("html", "data-answer");
+    await page.keyboard.press("Alt+Shift+ArrowLeft");
+    await changed(page, before);
+    await page.keyboard.press("r");
+    before = await page.getAttribute("html", "data-answer");
+    await page.keyboard.press("Alt+ArrowUp");
+    await changed(page, before);
+    const turned = await answer(page);
+    assert.notEqual(turned.pose[0], 1);
+    const view = () => page.evaluate(() => window.cbvhView.stage.camera.position.toArray());
+    const eye = await view();
+    await page.keyboard.press("ArrowLeft");
+    assert.notDeepEqual(await view(), eye);
+    await page.keyboard.press("?");
+    assert.ok(await page.isVisible("dialog >> text=fit everything into the view"));
+    await page.keyboard.press("Escape");
+    await page.waitForFunction(() => document.querySelector("dialog") === null);
+    await page.keyboard.press("d");
+    assert.equal(await page.getAttribute("html", "data-theme"), "dark");
+    // All controls can be reached.
+    const unreachable = await page.evaluate(() =>
+        [...document.querySelectorAll(".toolbar button, .panel button, .panel input, .panel textarea, .panel select")]
+            .filter((control) => control.tabIndex < 0 && control.getAttribute("role") !== "tab")
+            .map((control) => control.outerHTML),
+    );
+    assert.deepEqual(unreachable, []);
+    const nameless = await page.evaluate(() =>
+        [...document.querySelectorAll("button, input, select, textarea")]
+            .filter((control) => `${control.textContent}${control.getAttribute("aria-label") ?? ""}`.trim() === "")
+            .map((control) => control.outerHTML),
+    );
+    assert.deepEqual(nameless, []);
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("contact shows its depth, and moves B out", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair([1, 0, 0, 2.2, 0, 1, 0, 0.1, 0, 0, 1, 0.3]), { dark: true });
+    const before = await page.getAttribute("html", "data-answer");
+    assert.ok((await answer(page)).contacts > 0);
+    const button = page.locator("button", { hasText: "Move B out" });
+    await button.waitFor();
+    await picture(page, "contact");
+    await button.click();
+    await changed(page, before);
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a motion has its certain time and its hit, as the command says", { skip: WITHOUT }, async () => {
+    const end = [...BESIDE];
+    end[3] = -4.5;
+    const motion = [...BESIDE, ...end];
+    const html = filled(
+        [
+            ["ring.cbvh", RING()],
+            ["box.cbvh", BOX()],
+        ],
+        { kind: "motion", motion, clearance: 0.25, tolerance: null },
+    );
+    const { page, errors, close } = await open(html);
+    const [a, b] = [path.join(folder, "ring.obj.cbvh"), path.join(folder, "box.obj.cbvh")];
+    const file = written("motion.txt", `${motion.join(" ")}\n`);
+    const [record] = command("motion", a, b, file, "--clearance", "0.25", "--json").trim().split("\n").map(JSON.parse);
+    const shown = await page.locator("#page-motion .number").evaluateAll((all) => all.map((one) => one.title));
+    assert.ok(shown.includes(String(record.free_until)), `${shown} has ${record.free_until}`);
+    assert.ok(shown.includes(String(record.touching_at)), `${shown} has ${record.touching_at}`);
+    const before = await page.getAttribute("html", "data-answer");
+    await page.locator("button", { hasText: "Go to the first hit" }).click();
+    await changed(page, before);
+    assert.ok((await answer(page)).distance <= 0.25);
+    assert.deepEqual(errors, []);
+    await picture(page, "motion");
+    await close();
+});
+
+test("the inside of a file has the numbers that dump prints", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(filled([["ring.cbvh", RING()]], { kind: "file" }));
+    assert.equal(await state(page), "ready");
+    const dump = JSON.parse(command("dump", path.join(folder, "ring.obj.cbvh"), "--json"));
+    const contents = await page.evaluate(async () => {
+        const found = await window.cbvhView.asker.ask("contents", 0);
+        return { ...found, levelCounts: [...found.levelCounts], levelLengths: [...found.levelLengths] };
+    });
+    assert.deepEqual(
+        contents.sections,
+        dump.sections.map(({ kind, offset, bytes }) => ({ name: kind, start: offset, bytes })),
+    );
+    const [object] = dump.objects;
+    assert.deepEqual(contents.levelLengths, [object.levels.length]);
+    object.levels.forEach((level, k) => {
+        const [treelets, children, packets, triangles] = contents.levelCounts.slice(4 * k, 4 * k + 4);
+        assert.equal(treelets, level.treelets);
+        assert.equal(children / treelets, level.mean_children);
+        assert.equal(packets, level.packets);
+        assert.equal(packets === 0 ? 0 : triangles / packets, level.mean_triangles_per_packet);
+    });
+    // The nodes of each level cover all triangles: each corner is within one of them, for boxes and for all slabs.
+    const outside = await page.evaluate(async (depth) => {
+        const { asker, bodies } = window.cbvhView;
+        const { positions } = bodies[0].shown;
+        const missed = [];
+        for (const slabs of ["boxes", "all"]) {
+            for (let level = 0; level <= depth; level++) {
+                const nodes = await asker.ask("level", 0, level, 100_000, slabs);
+                const planes = [];
+                for (let node = 0; node < nodes.count; node++) {
+                    const faces = [];
+                    for (let at = 3 * nodes.starts[node]; at < 3 * nodes.starts[node + 1]; at += 9) {
+                        const p = (k) => nodes.positions[at + k];
+                        const [u, v] = [
+                            [p(3) - p(0), p(4) - p(1), p(5) - p(2)],
+                            [p(6) - p(0), p(7) - p(1), p(8) - p(2)],
+                        ];
+                        const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+                        const length = Math.hypot(...n);
+                        if (length > 1e-9) {
+                            const unit = n.map((value) => value / length);
+                            faces.push([...unit, unit[0] * p(0) + unit[1] * p(1) + unit[2] * p(2)]);
+                        }
+                    }
+                    planes.push(faces);
+                }
+                for (let at = 0; at < positions.length; at += 27) {
+                    const [x, y, z] = positions.subarray(at, at + 3);
+                    const within = planes.some((faces) =>
+                        faces.every(([a, b, c, d]) => a * x + b * y + c * z <= d + 1e-4),
+                    );
+                    if (!within) {
+                        missed.push([slabs, level, x, y, z]);
+                    }
+                }
+            }
+        }
+        return missed.slice(0, 3);
+    }, object.levels.length);
+    assert.deepEqual(outside, []);
+    await page.selectOption('select[aria-label="Shape of nodes"]', "all");
+    await page.waitForSelector("text=which are leaf packets");
+    await page.selectOption('select[aria-label="Colours of triangles"]', "pages");
+    await page.locator("button", { hasText: "Check the whole file" }).click();
+    await page.waitForSelector("text=keeps all rules");
+    assert.deepEqual(errors, []);
+    await picture(page, "inside");
+    await close();
+});
+
+test("what a question visits is counted on both meshes", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair());
+    await page.click("#tab-inside");
+    await page.selectOption('select[aria-label="Colours of triangles"]', "visits");
+    await page.waitForSelector("text=packet tests");
+    const found = await page.evaluate(async () => {
+        const { asker, pair } = window.cbvhView;
+        const { nodeTests, packetTests, a, b } = await asker.ask(
+            "visits",
+            pair.a.side,
+            pair.b.side,
+            pair.pose,
+            "distance",
+        );
+        const sum = (rows) => rows.reduce((total, count, k) => total + (k % 3 === 2 ? count : 0), 0);
+        const met = (counts) => counts.reduce((total, count) => total + (count > 0 ? 1 : 0), 0);
+        return {
+            nodeTests,
+            packetTests,
+            a: sum(a.packets),
+            b: sum(b.packets),
+            met: [met(a.triangles), met(b.triangles)],
+        };
+    });
+    assert.ok(found.nodeTests > 0 && found.packetTests > 0);
+    assert.equal(found.a, found.b);
+    assert.ok(found.a >= found.packetTests && found.met[0] > 0 && found.met[1] > 0, JSON.stringify(found));
+    assert.deepEqual(errors, []);
+    await picture(page, "visits");
+    await close();
+});
+
+/** Drops a file on the page. */
+const dropped = (page, name, bytes) =>
+    page.evaluate(
+        ([name, bytes]) => {
+            const files = new DataTransfer();
+            files.items.add(new File([new Uint8Array(bytes)], name));
+            const event = new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true });
+            document.body.dispatchEvent(event);
+        },
+        [name, [...bytes]],
+    );
+
+test("dropped files are baked: the first becomes A, the next B", async () => {
+    const { page, errors, close } = await open(template());
+    await dropped(page, "ring.obj", Buffer.from(ring(16, 8)));
+    await page.waitForSelector(".file-name >> text=ring.obj");
+    assert.deepEqual((await answer(page)).triangles, [256]);
+    await dropped(page, "box.obj", Buffer.from(box()));
+    await page.waitForSelector(".file-name >> text=box.obj");
+    const found = await answer(page);
+    assert.deepEqual(found.triangles, [256, 12]);
+    assert.ok(found.distance > 0);
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click('[aria-label="Save A as .cbvh"]')]);
+    assert.equal(download.suggestedFilename(), "ring.cbvh");
+    const file = path.join(folder, "saved.cbvh");
+    await download.saveAs(file);
+    if (COMMAND !== undefined) {
+        command("validate", file);
+    }
+    await dropped(page, "ring.cbvh", readFileSync(file));
+    await page.waitForFunction(() => document.querySelectorAll(".file-name")[1]?.textContent === "ring.cbvh");
+    assert.deepEqual((await answer(page)).triangles, [256, 256]);
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a damaged file says which rule it breaks, and where", async () => {
+    const bad = testdata("bad-R15-flipped-bit.cbvh");
+    const { page, close } = await open(filled([["bad.cbvh", bad]], { kind: "file" }));
+    assert.equal(await state(page), "error");
+    const message = await page.getAttribute("html", "data-message");
+    assert.match(message, /R15/);
+    assert.match(message, /byte\s*4096/);
+    await picture(page, "damaged");
+    await close();
+
+    const other = await open(template());
+    await dropped(other.page, "bad.cbvh", bad);
+    await other.page.waitForSelector(".message.error >> text=R15");
+    assert.equal(await state(other.page), "ready");
+    await dropped(other.page, "notes.txt", Buffer.from("no mesh"));
+    await other.page.waitForSelector(".message.error >> text=notes.txt");
+    await other.close();
+});
+
+test("points and rays have answers", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(filled([["box.cbvh", BOX()]], { kind: "file" }));
+    await page.click("#tab-probes");
+    await page.fill('textarea[aria-label^="Points"]', "0 0 0\n0 0 2\n");
+    await page.fill('textarea[aria-label^="Rays"]', "0.1 0.2 3  0 0 -2\n");
+    await page.waitForSelector("#page-probes td >> text=inside");
+    const cells = await page
+        .locator("#page-probes tbody tr")
+        .evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
+    assert.deepEqual(
+        cells.slice(0, 2).map((row) => row.slice(1, 3)),
+        [
+            ["0.5", "inside"],
+            ["1.5", "outside"],
+        ],
+    );
+    assert.equal(cells[2][1], "1.25");
+    await page.fill('textarea[aria-label^="Points"]', "0 0\n");
+    await page.waitForSelector("text=line 1: expected 3 numbers");
+    assert.deepEqual(errors, []);
+    await picture(page, "probes");
+    await close();
+});
+
+test("a click asks about a triangle", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(filled([["box.cbvh", BOX()]], { kind: "file" }));
+    const { x, y, width, height } = await page.locator("canvas").boundingBox();
+    await page.mouse.click(x + width / 2, y + height / 2);
+    await page.waitForSelector(".card >> text=leaf packet");
+    await page.keyboard.press("Escape");
+    assert.equal(await page.isVisible(".card"), false);
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a link restores the pose and the view, and the command asks the same", { skip: WITHOUT }, async () => {
+    const { page, close } = await open(pair());
+    const before = await page.getAttribute("html", "data-answer");
+    await page.focus("canvas");
+    await page.keyboard.press("Alt+ArrowLeft");
+    await changed(page, before);
+    await page.keyboard.press("ArrowUp");
+    await page.click("#tab-inside");
+    const texts = await page.evaluate(async () => {
+        const copied = [];
+        window.cbvhView.copy = async (text) => {
+            copied.push(text);
+        };
+        document.querySelector('[aria-label="Copy a link to this view"]').click();
+        document.querySelector('[aria-label^="Copy the command line"]').click();
+        return copied;
+    });
+    const found = await answer(page);
+    const again = await open(pair(), { hash: new URL(texts[0]).hash });
+    assert.deepEqual((await answer(again.page)).pose, found.pose);
+    assert.equal(await again.page.getAttribute("#tab-inside", "aria-selected"), "true");
+    await again.close();
+    assert.match(texts[1], /^cbvh query ring\.cbvh box\.cbvh --mode distance --pose "/);
+    const pose = /--pose "(.*)"/.exec(texts[1])[1];
+    const [a, b] = [path.join(folder, "ring.obj.cbvh"), path.join(folder, "box.obj.cbvh")];
+    const said = command("query", a, b, "--mode", "distance", "--pose", pose);
+    assert.ok(said.startsWith(`distance ${found.distance}`), said);
+    await close();
+});
+
+test("a scene plays its frames and finds the pairs that touch", { skip: WITHOUT }, async () => {
+    const files = [
+        ["ring.cbvh", RING()],
+        ["box.cbvh", BOX()],
+    ];
+    const show = scene();
+    const { page, errors, close } = await open(filled(files, show));
+    assert.equal(await state(page), "ready");
+    const seen = [];
+    for (let frame = 0; frame < show.frames.length; frame++) {
+        await page.evaluate((frame) => window.cbvhView.scene.go(frame), frame);
+        seen.push((await answer(page)).touching);
+    }
+    assert.deepEqual(seen, [0, 1, 0]);
+    await page.evaluate(() => window.cbvhView.scene.go(1));
+    await page.locator(".list-row").first().click();
+    await picture(page, "scene");
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a clash report frames the chosen pair", { skip: WITHOUT }, async () => {
+    const { instances } = scene();
+    instances[1].pose = [1, 0, 0, 2.2, 0, 1, 0, 0.1, 0, 0, 1, 0.3];
+    const files = [
+        ["ring.cbvh", RING()],
+        ["box.cbvh", BOX()],
+    ];
+    const depth = { lower: 0.896, upper: 0.9, point: [2.2, 0.1, 0.15], translation: [0, 0, 0.9] };
+    const clashes = [
+        { a: 0, b: 1, class: "overlapping", ...depth },
+        { a: 0, b: 2, class: "near", distance: 0.8 },
+    ];
+    const show = { kind: "clash", instances, clashes };
+    const { page, errors, close } = await open(filled(files, show));
+    assert.equal(await state(page), "ready");
+    assert.equal(await page.locator(".list-row").count(), 2);
+    await page.locator(".list-row").first().click();
+    await page.waitForSelector(".clash-facts >> text=moves B out");
+    await picture(page, "clash");
+    await page.selectOption('select[aria-label="Class of clashes"]', "near");
+    assert.equal(await page.locator(".list-row").count(), 1);
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a narrow page has no horizontal overflow, in any tab", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair(), { size: { width: 400, height: 800 } });
+    for (const tab of ["pair", "motion", "inside", "probes"]) {
+        await page.click(`#tab-${tab}`);
+        await page.waitForTimeout(100);
+        const wide = await page.evaluate(() => [
+            document.documentElement.scrollWidth,
+            document.querySelector(".pages").scrollWidth - document.querySelector(".pages").clientWidth,
+        ]);
+        assert.deepEqual(wide, [400, 0], tab);
+    }
+    await page.click("#tab-pair");
+    await picture(page, "narrow");
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("without WebAssembly, the page says so", async () => {
+    const prepare = () => {
+        delete window.WebAssembly;
+    };
+    const { page, close } = await open(template(), { prepare });
+    assert.equal(await state(page), "error");
+    assert.match(await page.getAttribute("html", "data-message"), /needs WebAssembly/);
+    await close();
+});
+
+test("without WebGL, the page says so", async () => {
+    const plain = await launch(["--disable-gpu", "--disable-software-rasterizer", "--disable-3d-apis"]);
+    const { page, close } = await open(template(), { from: plain });
+    assert.equal(await state(page), "error");
+    assert.match(await page.getAttribute("html", "data-message"), /WebGL 2/);
+    assert.ok(await page.isVisible("h1"));
+    await close();
+    await plain.close();
+});
+
+test("a page that was cut off says so", async () => {
+    const html = filled([["ring.cbvh", Buffer.from("x")]], { kind: "file" }).replace(
+        /<script type="text\/plain" class="cbvh-file">.*?<\/script>/s,
+        "",
+    );
+    const { page, close } = await open(html);
+    assert.equal(await state(page), "error");
+    assert.match(await page.getAttribute("html", "data-message"), /expected 1 files in this page, found 0/);
+    await close();
+});
