@@ -24,7 +24,8 @@
 //! [`Scene`] answers these questions about many placed shapes, over all pairs that matter. [`Tracker`] answers them in
 //! less time for poses that follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points,
 //! rays and segments. Batches, and scenes on all cores, need the feature `parallel`, which is on by default and adds
-//! the dependency on rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`]. Points,
+//! the dependency on rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the
+//! feature `trace` records which nodes and packets a question visits. Points,
 //! rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in the world, in the
 //! world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
@@ -118,8 +119,6 @@ pub use scene::{
     Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact,
     SceneDistance, SceneError, SceneFileError, SceneMotionAnswer, ScenePair, SceneRayHit, WorldPoseError,
 };
-#[cfg(feature = "trace")]
-pub use traverse::trace::{Step, record};
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///
@@ -141,6 +140,12 @@ macro_rules! include_cbvh {
 #[repr(C, align(64))]
 #[derive(Debug)]
 pub struct Embedded<B: ?Sized>(pub B);
+
+/// What a question visits.
+#[cfg(feature = "trace")]
+pub mod trace {
+    pub use crate::traverse::trace::{Step, record};
+}
 
 pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::object::Object;

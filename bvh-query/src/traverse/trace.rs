@@ -62,3 +62,40 @@ pub(super) fn opened(side: u8, at: ChildRef, node: usize) {
 pub(super) fn packets((a, b): (LeafPacket, LeafPacket)) {
     add(Step::Packets([a, b].map(|leaf| (leaf.page, leaf.packet))));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Bvh, Pose, Querier};
+
+    #[test]
+    fn steps_lead_from_both_roots_to_the_packets_tested() {
+        let bytes = include_bytes!("../../../testdata/ok-everything.cbvh");
+        let bvh = Bvh::from_static(bytes).unwrap();
+        let mut querier = Querier::new().unwrap();
+        let mut ask = || querier.contacts(&bvh, &bvh, &Pose::IDENTITY).map(|found| found.len());
+        let (found, steps) = record(1000, &mut ask);
+        let found = found.unwrap();
+        let mut opened = [vec![0], vec![0]];
+        let mut packets = 0;
+        for step in &steps {
+            match *step {
+                Step::Objects(first) => {
+                    assert!(first.into_iter().all(|page| page < bvh.layout().page_count()));
+                    opened = [vec![0], vec![0]];
+                }
+                Step::Opened { side, parent, node, .. } => {
+                    let known = &mut opened[usize::from(side)];
+                    assert!(known.contains(&parent), "{step:?}");
+                    known.push(node);
+                }
+                Step::Packets(_) => packets += 1,
+            }
+        }
+        assert!(matches!(steps[0], Step::Objects(_)));
+        assert!(packets > 0 && found > 0);
+        // Outside of `record`, nothing is kept; and no more than asked for.
+        assert_eq!(ask().unwrap(), found);
+        assert_eq!(record(2, &mut ask).1, steps[..2]);
+    }
+}

@@ -6,13 +6,25 @@ use crate::inspect::tree::page;
 use crate::mesh::Mesh;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::decode_packet;
-use bvh_format::validate::packets;
-use js_sys::{Array, Float32Array, Uint16Array};
+use bvh_format::page::Page;
+use bvh_format::treelet::Child;
+use js_sys::{Array, Float32Array, Uint8Array, Uint16Array};
 use wasm_bindgen::prelude::*;
 
+/// The leaf packets of a checked page in the order of slots: the slot, the packet, and the number of its triangles.
+fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u8, u16, usize)> + 'a {
+    (0..page.header().treelets).flat_map(|slot| {
+        let links = page.links(slot);
+        (0..links.children()).filter_map(move |place| match links.child(place) {
+            Child::Leaf { packet, triangles } => Some((slot, packet, usize::from(triangles))),
+            _ => None,
+        })
+    })
+}
+
 /// The corners of all stored triangles in the order of the file, nine coordinates for each, less a point; the id of each; its
-/// packet in its page; for each page of the file, the number of the triangles before it, and all at the end; and pairs of a
-/// stored id and the id of a duplicate.
+/// packet in its page; the slot of the treelet that has the packet; for each page of the file, the number of the triangles before
+/// it, and all at the end; and pairs of a stored id and the id of a duplicate.
 #[wasm_bindgen(js_name = storedTriangles)]
 pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
     let (bvh, point) = (mesh.shape.bvh(), [x, y, z]);
@@ -22,7 +34,7 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
     let count = usize::try_from(count).unwrap_or(usize::MAX).min(bvh.bytes().len());
     let mut corners: Vec<[[f32; 3]; 3]> = room("triangles", [[0.0; 3]; 3], count)?;
     corners.clear();
-    let (mut numbers, mut in_page, mut before) = (vec![], vec![], vec![]);
+    let (mut numbers, mut in_page, mut slots, mut before) = (vec![], vec![], vec![], vec![]);
     for object in bvh.objects() {
         let origin = object.origin();
         for number in object.pages() {
@@ -33,7 +45,7 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
             let header = page.header();
             let (block, id_block) =
                 (layout.leaf_block(bvh.bytes(), header), layout.id_block(bvh.bytes(), header));
-            for (packet, lanes) in packets(&page) {
+            for (slot, packet, lanes) in packets(&page) {
                 let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                 for lane in 0..lanes {
                     let place = header.first_packet.get().wrapping_add(packet.into()).wrapping_mul(4);
@@ -43,6 +55,7 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
                         place.wrapping_add(lane as u32)
                     });
                     in_page.push(packet);
+                    slots.push(slot);
                     let near =
                         |v: [f32; 3]| [0, 1, 2].map(|k| (origin[k] + f64::from(v[k]) - point[k]) as f32);
                     corners.push(values.triangle(lane).map(near));
@@ -57,6 +70,7 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
         Float32Array::from(corners.as_flattened().as_flattened()).into(),
         ids(numbers.into_iter()),
         Uint16Array::from(&in_page[..]).into(),
+        Uint8Array::from(&slots[..]).into(),
         ids(before.into_iter()),
         ids(duplicates),
     ]

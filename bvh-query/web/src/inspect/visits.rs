@@ -6,7 +6,8 @@ use crate::mesh::Mesh;
 use bvh_format::object::Object;
 use bvh_format::page::Page;
 use bvh_format::treelet::Child;
-use bvh_query::{Bvh, Step};
+use bvh_query::Bvh;
+use bvh_query::trace::{Step, record};
 use js_sys::{Array, Float64Array};
 use std::collections::BTreeMap;
 use wasm_bindgen::prelude::*;
@@ -69,7 +70,7 @@ impl Side<'_> {
 pub fn visits(a: &Mesh, b: &Mesh, pose_of_b: &Float64Array, question: &str) -> Answer<Array> {
     let (of_b, shapes) = (pose(pose_of_b, "pose")?, [a, b].map(|mesh| mesh.shape.shape()));
     let [in_a, in_b] = shapes;
-    let (asked, steps) = bvh_query::record(MAX_STEPS, || {
+    let (asked, steps) = record(MAX_STEPS, || {
         with_querier(|querier| {
             match question {
                 "distance" => querier.distance(in_a, in_b, &of_b).map(|_| ()),

@@ -22,8 +22,8 @@ import type { Asker } from "./asker.js";
 import { identity, type Pose } from "./pose.js";
 import type { Stage } from "./stage.js";
 
-/** How a ball is lit, from which the light on each triangle is looked up: a key light, a weak one, and a bright rim. */
-function litBall(): DataTexture {
+/** How a ball is lit, from which the light on each triangle is looked up: a key light, a weak one, and a dark rim. */
+function litBall(strength: number): DataTexture {
     const side = 128;
     const pixels = new Uint8Array(4 * side * side);
     const unit = (x: number, y: number, z: number) => {
@@ -43,7 +43,8 @@ function litBall(): DataTexture {
                 Math.max(x * light[0] + y * light[1] + z * light[2], 0);
             const shine = Math.max(2 * lit(key) * z - key[2], 0) ** 24;
             const rim = (1 - z) ** 3;
-            const light = 0.3 + 0.62 * lit(key) + 0.2 * lit(fill) + 0.14 * shine - 0.1 * rim;
+            const shade = 0.62 * lit(key) + 0.2 * lit(fill) + 0.14 * shine - 0.1 * rim;
+            const light = 0.3 + 0.5 * (1 - strength) + strength * shade;
             const level = Math.round(255 * Math.min(Math.max(light, 0), 1) ** 0.92);
             pixels.set([level, level, Math.min(255, level + 4), 255], 4 * (row * side + column));
         }
@@ -56,13 +57,14 @@ function litBall(): DataTexture {
 }
 
 let ball: DataTexture | undefined;
+let paleBall: DataTexture | undefined;
 
 /** A material that looks lit. */
 export function material(
     colour: number,
     options: { transparent?: boolean; opacity?: number } = {},
 ): MeshMatcapMaterial {
-    ball ??= litBall();
+    ball ??= litBall(1);
     return new MeshMatcapMaterial({ color: colour, matcap: ball, flatShading: true, side: DoubleSide, ...options });
 }
 
@@ -265,6 +267,9 @@ export class Body {
         } else {
             geometry.setAttribute("color", colours);
         }
+        // Colours that mean something are shaded less.
+        paleBall ??= litBall(0.45);
+        material.matcap = colours === undefined ? (ball ?? null) : paleBall;
         material.vertexColors = colours !== undefined;
         material.color.setHex(colours === undefined ? colour : 0xffffff);
         material.needsUpdate = true;

@@ -40,6 +40,10 @@ const SECTION_COLOURS: Record<string, string> = {
     "between sections": "#cbd5e1",
 };
 
+/** The place in the scale of heat: nothing, opened but not tested, or tested. */
+const heatOf = (tested: number, most: number, isMet: boolean): number =>
+    tested > 0 ? 0.4 + (0.6 * Math.log1p(tested)) / Math.log1p(most) : isMet ? 0.2 : 0;
+
 export class Inside {
     readonly #page: HTMLElement;
     readonly #contents = h("div");
@@ -398,7 +402,7 @@ export class Inside {
         for (let node = 0; node < found.count; node++) {
             const count = counts?.[node] ?? 0;
             if (counts !== undefined) {
-                heat(count === 0 ? 0 : 0.3 + (0.7 * Math.log1p(count)) / Math.log1p(most), colour);
+                heat(heatOf(count, most, count > 0), colour);
             } else if (found.count <= 400) {
                 distinct(node, colour);
             } else {
@@ -511,16 +515,16 @@ export class Inside {
             });
         } else {
             const side = body === this.app.pair.b ? this.#visits?.b : this.#visits?.a;
-            const counts = side?.triangles ?? new Uint32Array(shown.triangles);
+            const { tested = new Uint32Array(), opened = new Uint32Array() } = side ?? {};
             let most = 1;
-            for (const count of counts) {
+            for (const count of tested) {
                 most = Math.max(most, count);
             }
-            counts.forEach((count, triangle) => {
-                put(triangle, count, () =>
-                    heat(count === 0 ? 0 : 0.3 + (0.7 * Math.log1p(count)) / Math.log1p(most), colour),
-                );
-            });
+            for (let triangle = 0; triangle < shown.triangles; triangle++) {
+                const count = tested[triangle] ?? 0;
+                const key = count > 0 ? count + 1 : (opened[triangle] ?? 0) > 0 ? 1 : 0;
+                put(triangle, key, () => heat(heatOf(count, most, key > 0), colour));
+            }
         }
         return new BufferAttribute(colours, 3, true);
     }
@@ -541,7 +545,7 @@ export class Inside {
                 { class: "heat-scale" },
                 h("span", {}, "not met"),
                 h("span", { class: "heat-bar" }),
-                h("span", {}, "met most"),
+                h("span", {}, "tested most"),
             ),
             h(
                 "dl",

@@ -8,18 +8,11 @@ import { listen } from "./keys.js";
 import { restore } from "./link.js";
 import { unpack } from "./unpack.js";
 
-/** Refuses a browser that cannot show the page. The worker checks for SIMD. */
+/** Refuses a browser without WebAssembly. The worker checks for SIMD, and the stage for WebGL. */
 function checkBrowser(): void {
     if (typeof WebAssembly !== "object" || typeof WebAssembly.instantiate !== "function") {
         throw new Error("this page needs WebAssembly, which is switched off in this browser");
     }
-    const context = document.createElement("canvas").getContext("webgl2");
-    if (context === null) {
-        throw new Error(
-            "this page draws with WebGL 2, which this browser does not offer; is the graphics card switched off?",
-        );
-    }
-    context.getExtension("WEBGL_lose_context")?.loseContext();
 }
 
 async function start(): Promise<void> {
@@ -35,14 +28,17 @@ async function start(): Promise<void> {
         checkBrowser();
         const filled = readContent();
         const [worker, module] = await Promise.all([unpack("cbvh-worker"), unpack("cbvh-module")]);
+        performance.mark("unpacked");
         const asker = new Asker(worker);
-        await asker.ask("start", module);
+        const started = asker.ask("start", module);
         const host = document.getElementById("app");
         if (host === null) {
             throw new Error("expected the element #app in this page, found none");
         }
         const app = new App(asker, host);
         listen(app);
+        await started;
+        performance.mark("module started");
         if (filled === undefined) {
             app.showNothing();
         } else {
@@ -55,6 +51,7 @@ async function start(): Promise<void> {
         app.stage.drawNow();
         document.getElementById("loading")?.remove();
         root.dataset.state = "ready";
+        performance.mark("drawn");
         Object.assign(window, { cbvhView: app });
     } catch (error) {
         const message = messageOf(error);

@@ -101,11 +101,13 @@ export class Stage {
         this.#overlay = document.createElement("div");
         this.#overlay.className = "labels";
         host.append(this.canvas, this.#overlay);
-        this.#renderer = new WebGLRenderer({
-            canvas: this.canvas,
-            antialias: true,
-            powerPreference: "high-performance",
-        });
+        const context = this.canvas.getContext("webgl2", { antialias: true, powerPreference: "high-performance" });
+        if (context === null) {
+            throw new Error(
+                "this page draws with WebGL 2, which this browser does not offer; is the graphics card switched off?",
+            );
+        }
+        this.#renderer = new WebGLRenderer({ canvas: this.canvas, context });
         this.#renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
         this.#renderer.autoClear = false;
         this.camera.up.set(0, 0, 1);

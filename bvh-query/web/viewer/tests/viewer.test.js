@@ -374,7 +374,7 @@ test("what a question visits is counted on both meshes", { skip: WITHOUT }, asyn
             packetTests,
             a: sum(a.packets),
             b: sum(b.packets),
-            met: [met(a.triangles), met(b.triangles)],
+            met: [met(a.tested), met(b.tested)],
         };
     });
     assert.ok(found.nodeTests > 0 && found.packetTests > 0);

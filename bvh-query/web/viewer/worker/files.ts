@@ -46,6 +46,7 @@ export class LoadedFile {
     readonly centre: Float64Array;
     #ids: Uint32Array | undefined;
     #packets: Uint16Array = new Uint16Array();
+    #slots: Uint8Array = new Uint8Array();
     #pageStarts: Uint32Array = new Uint32Array();
     #duplicates: Uint32Array = new Uint32Array();
     /** The place of each id in the drawn order, plus one; one list for each object if the file has no ids. */
@@ -121,15 +122,17 @@ export class LoadedFile {
     triangles(): Triangles {
         const { centre } = this;
         const [x = 0, y = 0, z = 0] = centre;
-        const [positions, ids, packets, pageStarts, duplicates] = raw.storedTriangles(this.raw, x, y, z) as [
+        const [positions, ids, packets, slots, pageStarts, duplicates] = raw.storedTriangles(this.raw, x, y, z) as [
             Float32Array,
             Uint32Array,
             Uint16Array,
+            Uint8Array,
             Uint32Array,
             Uint32Array,
         ];
         this.#ids = ids;
         this.#packets = packets;
+        this.#slots = slots;
         this.#pageStarts = pageStarts;
         this.#duplicates = duplicates;
         this.#places = undefined;
@@ -208,14 +211,20 @@ export class LoadedFile {
         };
     }
 
-    /** Spreads counts of packets, in rows of page, packet and count, to the triangles in the drawn order. */
-    spread(rows: Uint32Array): Uint32Array {
-        const counts = new Uint32Array(this.#packets.length);
+    /**
+     * Spreads counts to the triangles in the drawn order.
+     *
+     * @param rows Rows of page, number and count.
+     * @param of What the numbers are: those of packets, or the slots of the treelets that have the packets.
+     */
+    spread(rows: Uint32Array, of: "packets" | "treelets"): Uint32Array {
+        const numbers = of === "packets" ? this.#packets : this.#slots;
+        const counts = new Uint32Array(numbers.length);
         for (let k = 0; k < rows.length; k += 3) {
-            const [page = 0, packet = 0, count = 0] = rows.subarray(k, k + 3);
+            const [page = 0, number = 0, count = 0] = rows.subarray(k, k + 3);
             const end = this.#pageStarts[page + 1] ?? 0;
             for (let at = this.#pageStarts[page] ?? 0; at < end; at++) {
-                if (this.#packets[at] === packet) {
+                if (numbers[at] === number) {
                     counts[at] = count;
                 }
             }

@@ -141,7 +141,9 @@ export function visits(a: Side, b: Side, pose: Float64Array, question: string) {
         ];
         const [nodeTests = 0, packetTests = 0, exactTests = 0, steps = 0] = numbers;
         const side = ({ file: number }: Side, [treelets, packets]: [Uint32Array, Uint32Array]) => ({
-            triangles: file(number).spread(packets),
+            // How often the packet of each triangle was tested, and how often the treelet that has the packet was opened.
+            tested: file(number).spread(packets, "packets"),
+            opened: file(number).spread(treelets, "treelets"),
             treelets,
             packets,
         });
