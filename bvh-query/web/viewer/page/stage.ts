@@ -351,9 +351,9 @@ export class Stage {
         };
     }
 
-    /** Draws soon. */
+    /** Draws soon. Nothing is drawn before `drawNow` was called once, when all of the content is there. */
     draw(): void {
-        if (!this.#isDue) {
+        if (!this.#isDue && this.#framesDrawn > 0) {
             this.#isDue = true;
             requestAnimationFrame(() => this.drawNow());
         }

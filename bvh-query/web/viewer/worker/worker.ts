@@ -9,11 +9,23 @@ import * as scenes from "./scenes.js";
 
 let tell: (stage: string) => void = () => {};
 
+/** Reads base64. New browsers have a function for it, which takes a tenth of the time. */
+function fromBase64(text: string): Uint8Array<ArrayBuffer> {
+    const native = (Uint8Array as { fromBase64?: (text: string) => Uint8Array<ArrayBuffer> }).fromBase64;
+    if (native !== undefined) {
+        return native.call(Uint8Array, text);
+    }
+    const letters = atob(text);
+    const bytes = new Uint8Array(letters.length);
+    for (let place = 0; place < letters.length; place++) {
+        bytes[place] = letters.charCodeAt(place);
+    }
+    return bytes;
+}
+
 /** Unpacks what is embedded in the page: base64 of gzip. */
 async function unpack(text: string): Promise<Uint8Array> {
-    const letters = atob(text);
-    const packed = Uint8Array.from({ length: letters.length }, (_, k) => letters.charCodeAt(k));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const stream = new Blob([fromBase64(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
