@@ -236,7 +236,7 @@ export class Stage {
         const right = new Vector3().crossVectors(this.camera.up, away).normalize();
         const above = new Vector3().crossVectors(away, right);
         const upright = Math.tan((this.camera.fov * Math.PI) / 360);
-        const margin = 0.86;
+        const margin = 0.94;
         let distance = 1e-6;
         for (let corner = 0; corner < 8; corner++) {
             const offset = new Vector3(
