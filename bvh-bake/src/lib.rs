@@ -79,7 +79,7 @@ pub use error::{BakeError, InputError, LimitError, Place, ReadError, ShapeError}
 pub use input::{MeshFormat, mesh, read_meshes};
 pub use options::{Effort, Options};
 pub use progress::{Progress, Stage, Step, Traffic};
-pub use storage::atomic::{discard_unfinished, write_atomically};
+pub use storage::atomic::{discard_unfinished, write_atomically, write_atomically_with};
 pub use storage::stored_file::{FileError, StoredFile};
 
 /// Compiles the examples of the crate's README.

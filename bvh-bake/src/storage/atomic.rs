@@ -20,9 +20,21 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// [`BakeError::Write`] if the system refuses, or if something other than a regular file has the name.
 /// Nothing is left behind then.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), BakeError> {
+    write_atomically_with(path, |out| out.write_all(bytes))
+}
+
+/// Replaces a file by what `write` writes, in the way of [`write_atomically`]. This is for outputs that are never in memory as
+/// a whole. Writes are not buffered.
+///
+/// # Errors
+/// The errors of [`write_atomically`], and that of `write` as [`BakeError::Write`].
+pub fn write_atomically_with(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), BakeError> {
     refuse_special(path)?;
     let mut temporary = Temporary::beside(path)?;
-    temporary.file.write_all(bytes).map_err(failed(path, "write"))?;
+    write(&mut temporary.file).map_err(failed(path, "write"))?;
     temporary.rename(path)
 }
 
@@ -248,6 +260,12 @@ mod tests {
         drop((used, second));
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), others.len());
         write_atomically(&output, b"whole").unwrap();
+        assert_eq!(fs::read(&output).unwrap(), b"whole");
+        let broken = write_atomically_with(&output, |out| {
+            out.write_all(b"half")?;
+            Err(io::Error::other("no more"))
+        });
+        assert!(matches!(broken, Err(BakeError::Write { action: "write", .. })), "{broken:?}");
         assert_eq!(fs::read(&output).unwrap(), b"whole");
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), others.len() + 1);
     }

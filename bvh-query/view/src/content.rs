@@ -1,0 +1,136 @@
+//! What a page shows, as it says so in JSON.
+
+use crate::files::{Entry, Part};
+use bvh_query::{ClashClass, Groups, Pose};
+use serde::{Serialize, Serializer};
+
+/// The version of what pages say.
+pub(crate) const VERSION: u32 = 1;
+
+/// All that a page says besides the bytes of its files.
+#[derive(Serialize)]
+pub(crate) struct Content<'a> {
+    pub(crate) version: u32,
+    pub(crate) files: Vec<Entry<'a>>,
+    pub(crate) show: &'a Show,
+}
+
+/// What is shown of the files.
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub(crate) enum Show {
+    /// One file alone.
+    File,
+    /// B in the frame of A.
+    Pair {
+        #[serde(serialize_with = "one_pose")]
+        pose: Pose,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        within: Option<f64>,
+        /// Whether the first file is both A and B.
+        #[serde(skip_serializing_if = "is_false")]
+        same: bool,
+    },
+    /// B on its way from one pose to another.
+    Motion {
+        #[serde(serialize_with = "both_poses")]
+        motion: [Pose; 2],
+        clearance: f64,
+        /// None leaves the choice to the library.
+        tolerance: Option<f64>,
+        #[serde(skip_serializing_if = "is_false")]
+        same: bool,
+    },
+    /// Instances in the world, and frames of those that move.
+    Scene {
+        instances: Vec<Instance>,
+        allowed: Vec<[usize; 2]>,
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pair_margins: Vec<(usize, usize, f64)>,
+        frames: Vec<Frame>,
+    },
+    /// Instances in the world, and which of them clash.
+    Clash { instances: Vec<Instance>, clashes: Vec<Found> },
+}
+
+/// A shape in the world.
+#[derive(Debug, Serialize)]
+pub(crate) struct Instance {
+    pub(crate) name: String,
+    /// The number of its file.
+    pub(crate) file: usize,
+    #[serde(flatten)]
+    pub(crate) part: Part,
+    #[serde(serialize_with = "one_pose")]
+    pub(crate) pose: Pose,
+    pub(crate) margin: f64,
+    pub(crate) moving: bool,
+    /// The groups that it is in and those that it meets, unless these are all, or follow from what moves.
+    #[serde(flatten)]
+    pub(crate) groups: Option<GroupsOf>,
+}
+
+/// The groups of an instance.
+#[derive(Debug, Serialize)]
+pub(crate) struct GroupsOf {
+    member: u32,
+    meets: u32,
+}
+
+impl GroupsOf {
+    pub(crate) fn new(groups: Groups) -> Option<Self> {
+        let Groups { member, meets } = groups;
+        (groups != Groups::ALL).then_some(Self { member, meets })
+    }
+}
+
+/// The poses of all moving instances, in the order of the instances.
+#[derive(Debug)]
+pub(crate) struct Frame(pub(crate) Vec<Pose>);
+
+/// Two instances that clash.
+#[derive(Debug, Serialize)]
+pub(crate) struct Found {
+    pub(crate) a: usize,
+    pub(crate) b: usize,
+    #[serde(serialize_with = "class_name")]
+    pub(crate) class: ClashClass,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lower: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) upper: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) distance: Option<f64>,
+    pub(crate) point: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) translation: Option<[f64; 3]>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
+pub(crate) fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+/// Returns the rows of the 3 by 4 matrix of a pose.
+fn rows(pose: &Pose) -> [f64; 12] {
+    let ([a, b, c], [x, y, z]) = (pose.rotation(), pose.translation());
+    [a[0], a[1], a[2], x, b[0], b[1], b[2], y, c[0], c[1], c[2], z]
+}
+
+fn one_pose<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok, S::Error> {
+    rows(pose).serialize(serializer)
+}
+
+fn both_poses<S: Serializer>(poses: &[Pose; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(poses.iter().flat_map(rows))
+}
+
+impl Serialize for Frame {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().flat_map(rows))
+    }
+}
+
+fn class_name<S: Serializer>(class: &ClashClass, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(class.name())
+}

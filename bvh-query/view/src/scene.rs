@@ -1,0 +1,59 @@
+//! The page of a scene of the query library.
+
+use crate::PageError;
+use crate::files::Named;
+use crate::page::{Page, Placed};
+use bvh_query::{InstanceId, OwnedShape, Pose, Scene, ScenePair};
+use std::collections::HashMap;
+
+/// Which instances of a scene move, and how.
+#[derive(Clone, Debug, Default)]
+pub struct Frames {
+    /// The instances that move.
+    pub moving: Vec<InstanceId>,
+    /// In each frame, the poses of these instances, in the same order.
+    pub poses: Vec<Vec<Pose>>,
+    /// Whether questions are about all pairs in which an instance moves, or about all pairs if none does. Otherwise the groups
+    /// of the instances select the pairs.
+    pub selects_pairs: bool,
+}
+
+impl Page {
+    /// Shows a scene as it is, and frames of those instances that move. `name_of` gives the name and the path of the file of an
+    /// instance. An instance without a name is called `#` and its number.
+    ///
+    /// # Errors
+    /// The errors of [`Page::scene`]; [`PageError::Shape`] if the file of a shape is no longer there.
+    pub fn of_scene(
+        scene: &Scene,
+        frames: &Frames,
+        name_of: impl Fn(InstanceId, &OwnedShape) -> (String, String),
+    ) -> Result<Self, PageError> {
+        let ids: Vec<InstanceId> = scene.instances().collect();
+        let places: HashMap<InstanceId, usize> = ids.iter().copied().zip(0..).collect();
+        // The place of each moving instance among those that move, in the order of the instances.
+        let mut moving: Vec<(InstanceId, usize)> = frames.moving.iter().copied().zip(0..).collect();
+        moving.sort_unstable();
+        moving.dedup_by_key(|(id, _)| *id);
+        let mut placed = Vec::with_capacity(ids.len());
+        for &id in &ids {
+            let shape = scene.shape(id)?.opened()?;
+            let (file_name, path) = name_of(id, &shape);
+            placed.push(Placed {
+                name: scene.name(id)?.map_or_else(|| format!("#{id}"), str::to_owned),
+                of: Named { name: file_name, path, shape },
+                pose: *scene.pose(id)?,
+                margin: scene.margin(id)?,
+                groups: if frames.selects_pairs { None } else { Some(scene.groups(id)?) },
+                moving: moving.binary_search_by_key(&id, |(id, _)| *id).is_ok(),
+            });
+        }
+        let pair = |ScenePair { a, b, .. }: ScenePair| Some([*places.get(&a)?, *places.get(&b)?]);
+        let allowed = scene.allowed().filter_map(pair).collect();
+        let margins = scene.pair_margins().filter_map(|(of, margin)| Some((pair(of)?, margin))).collect();
+        let in_order =
+            |poses: &Vec<Pose>| moving.iter().filter_map(|&(_, at)| poses.get(at).copied()).collect();
+        let frames = frames.poses.iter().map(in_order).collect();
+        Self::scene(placed, allowed, margins, frames)
+    }
+}
