@@ -19,7 +19,7 @@ pub(super) struct Found<'a> {
     /// The bounds of the depth.
     pub(super) depth: Option<[f64; 2]>,
     /// What moves the second part out of the first one.
-    translation: Option<[f64; 3]>,
+    pub(super) translation: Option<[f64; 3]>,
     pub(super) point: [f64; 3],
     /// How the clash compares with that of the baseline.
     pub(super) status: Option<Status>,

@@ -3,6 +3,7 @@
 mod baseline;
 mod bcf;
 mod found;
+mod page;
 mod parts;
 mod zip;
 
@@ -10,6 +11,7 @@ use crate::asking::{self, files::write_file};
 use crate::console::{self, Failure, Record, counted, csv, record, spinner};
 use crate::options::{Shard, not_negative, threads, whole};
 use crate::process;
+use crate::view::output::{self, PageArguments, refuse_input};
 use baseline::{Baseline, Old};
 use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, QueryError, SceneError};
 use clap::Args;
@@ -24,7 +26,7 @@ Examples:
   cbvh clash parts --clearance 2 --tolerance 0.01 --csv clashes.csv
   cbvh clash base.stl arm.stl cover.cbvh --json > clashes.json
   cbvh clash factory.glb --baseline clashes.json --fail-on overlapping,intersecting
-  cbvh clash factory.cbvh --bcf clashes.bcfzip
+  cbvh clash factory.cbvh --bcf clashes.bcfzip --view clashes.html
   cbvh clash --manifest parts.jsonl --shard 3/16 --json > clashes.3.json
 
 The parts are the instances of a scene (.glb and .gltf files, and what cbvh bake --scene made), the objects of a .cbvh file, \
@@ -59,6 +61,8 @@ differs by more than the tolerance) or same; gone has those that are no more. As
 
 --bcf writes BCF 2.1 for CAD and BIM tools: a topic for each clash, with a view of it in which both parts are selected. Its \
 identifiers follow from the id. Such tools take mesh units for metres, and z for up. SOURCE_DATE_EPOCH sets its date.
+
+--view writes a page that shows all parts and lists the clashes, and needs nothing but a browser. See cbvh help view.
 
 Each line of a manifest is a JSON object such as {\"file\": \"arm.cbvh\", \"name\": \"left arm\", \"pose\": [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, \
 1, 0]}. The pose has the rows of the matrix [R | t]; it and the name may be missing. Files are relative to the manifest. With \
@@ -104,6 +108,11 @@ pub(crate) struct ClashArguments {
     /// Write the clashes to this file as topics of BCF 2.1
     #[arg(long, value_name = "F.bcfzip")]
     bcf: Option<PathBuf>,
+    /// Write a page that shows the parts and their clashes
+    #[arg(long, value_name = "PAGE.html")]
+    view: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArguments,
     /// The most clashes to list for a person; 0 lists all
     #[arg(long, value_name = "N", default_value = "100", value_parser = whole::<usize>, allow_negative_numbers = true)]
     limit: usize,
@@ -144,6 +153,13 @@ pub(crate) fn run(arguments: &ClashArguments) -> Result<(), Failure> {
 
 fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> Result<(), Failure> {
     let start = Instant::now();
+    if arguments.page.is_given() && arguments.view.is_none() {
+        return Err(Failure::usage("--max-page requires --view"));
+    }
+    if let Some(view) = &arguments.view {
+        let inputs = arguments.files.iter().chain(&arguments.manifest).chain(&arguments.baseline);
+        refuse_input(view, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
+    }
     let baseline = arguments.baseline.as_deref().map(Baseline::read).transpose()?;
     let spinner = spinner(false);
     process::remove_unfinished_files(&spinner)?;
@@ -221,6 +237,13 @@ struct Answer<'a> {
 
 impl Answer<'_> {
     fn write_files(&self) -> Result<(), Failure> {
+        let ClashArguments { view, page: limits, .. } = self.arguments;
+        // A page that is too large is refused before anything is written.
+        let page =
+            view.as_ref().map(|_| limits.limit(page::page(self.assembly, &self.found)?)).transpose()?;
+        if let Some((path, page)) = view.as_deref().zip(page) {
+            output::write(&page, path)?;
+        }
         if let Some(path) = &self.arguments.csv {
             write_file(path, &self.csv())?;
         }

@@ -25,8 +25,8 @@ pub(super) struct Part {
     pub(super) file: Arc<Path>,
     pub(super) shape: SceneShape,
     pub(super) world: Pose,
-    margin: f64,
-    groups: Groups,
+    pub(super) margin: f64,
+    pub(super) groups: Groups,
     is_solid: bool,
     /// The checksum of the content that its shape is from, and the number of its object there.
     content: (u64, usize),

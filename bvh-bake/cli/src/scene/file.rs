@@ -1,7 +1,7 @@
 //! Reads scene files (meshes and other shapes, instances, moving instances, allowed pairs and margins), and opens baked scenes.
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
-use crate::asking::mesh::{How, LoadedMesh, point_out_units, triangles_of};
+use crate::asking::mesh::{How, LoadedMesh, is_baked, point_out_units, triangles_of};
 use crate::console::Failure;
 use crate::options::LayoutArguments;
 use crate::process::map;
@@ -21,10 +21,12 @@ const STILL: u32 = 2;
 
 /// A scene file, each item with the number of its line.
 #[derive(Default)]
-pub(super) struct SceneText {
+pub(crate) struct SceneText {
     shapes: Vec<Described>,
+    /// The names of the shapes.
+    names: Vec<String>,
     instances: Vec<(usize, String, usize, Pose)>,
-    pub(super) moving: Vec<String>,
+    pub(crate) moving: Vec<String>,
     /// Places in `instances`.
     moving_instances: Vec<usize>,
     allowed: Vec<(usize, usize)>,
@@ -47,19 +49,21 @@ enum Described {
 const CYLINDER_ERROR: f64 = 0.002;
 
 /// A scene that is ready to be asked.
-pub(super) struct LoadedScene {
-    pub(super) scene: Scene,
-    pub(super) moving: Vec<InstanceId>,
+pub(crate) struct LoadedScene {
+    pub(crate) scene: Scene,
+    pub(crate) moving: Vec<InstanceId>,
     /// The triangles of each mesh once, exact duplicates included.
-    pub(super) triangles: u64,
+    pub(crate) triangles: u64,
     /// The seconds of baking meshes and opening files.
-    pub(super) build_seconds: f64,
+    pub(crate) build_seconds: f64,
+    /// For each instance of a scene file, in order, the name of its shape and the file that has it.
+    pub(crate) sources: Vec<(String, PathBuf)>,
     /// The number of pairs that were asked about, in all timed frames.
-    pub(super) pairs_asked: u64,
+    pub(crate) pairs_asked: u64,
 }
 
 /// Reads a scene file without opening its meshes.
-pub(super) fn read(path: &Path) -> Result<SceneText, Failure> {
+pub(crate) fn read(path: &Path) -> Result<SceneText, Failure> {
     let bytes = files::read_text(path)?;
     let text = String::from_utf8_lossy(&bytes);
     let mut scene = SceneText::default();
@@ -195,6 +199,7 @@ impl SceneText {
             return Err(format!("expected a name of its own, found a second shape {name:?}"));
         }
         self.shapes.push(shape);
+        self.names.push(name.to_owned());
         Ok(())
     }
 }
@@ -219,7 +224,7 @@ fn read_points(path: &Path) -> Result<Mesh, Failure> {
 impl LoadedScene {
     /// Returns the name of an instance as it is printed: in quotes unless it is one plain word, and `#` and the number of an
     /// instance without a name.
-    pub(super) fn name(&self, id: InstanceId) -> String {
+    pub(crate) fn name(&self, id: InstanceId) -> String {
         match self.scene.name(id) {
             Ok(Some(name)) if name.chars().all(|c| c.is_ascii_graphic() && !"\"#".contains(c)) => {
                 name.to_owned()
@@ -230,13 +235,25 @@ impl LoadedScene {
     }
 
     /// Returns the names of the moving instances.
-    pub(super) fn names_of_moving(&self) -> Vec<String> {
+    pub(crate) fn names_of_moving(&self) -> Vec<String> {
         self.moving.iter().map(|&id| self.name(id)).collect()
     }
 }
 
+/// Returns whether a file is a `.cbvh` file rather than a scene file. Refuses glTF, which is neither.
+pub(crate) fn is_baked_scene(path: &Path) -> Result<bool, Failure> {
+    let is_baked = is_baked(path)?;
+    if !is_baked && MeshFormat::from_extension(path) == Some(MeshFormat::Gltf) {
+        let name = path.display();
+        return Err(Failure::Invalid(format!(
+            "{name}: expected a scene file, found glTF; bake it first: cbvh bake {name} --scene -o scene.cbvh"
+        )));
+    }
+    Ok(is_baked)
+}
+
 /// Opens a baked scene, all of whose instances move. All pages are checked, so that no frame pays for that.
-pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure> {
+pub(crate) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure> {
     let start = Instant::now();
     let bvh = map(path, ReadAhead::Usual)?;
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
@@ -249,13 +266,14 @@ pub(super) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure
         moving: scene.instances().collect(),
         scene,
         triangles: triangles_of(bvh.objects()),
+        sources: Vec::new(),
         build_seconds: start.elapsed().as_secs_f64(),
         pairs_asked: 0,
     })
 }
 
 /// Opens or bakes the meshes and adds the instances.
-pub(super) fn load(
+pub(crate) fn load(
     path: &Path,
     text: &SceneText,
     layout: &LayoutArguments,
@@ -266,6 +284,7 @@ pub(super) fn load(
         scene: Scene::with_backend(backend),
         moving: Vec::new(),
         triangles: 0,
+        sources: Vec::new(),
         build_seconds: 0.0,
         pairs_asked: 0,
     };
@@ -307,6 +326,11 @@ pub(super) fn load(
     for (number, name, mesh, pose) in &text.instances {
         let id = loaded.scene.add_named(name.clone(), shapes[*mesh].clone(), *pose);
         ids.push(id.map_err(|error| Failure::invalid(path, format_args!("line {number}: {error}")))?);
+        let file = match &text.shapes[*mesh] {
+            Described::Mesh(file) | Described::Cloud(file, _) => file,
+            Described::Core(..) => path,
+        };
+        loaded.sources.push((text.names[*mesh].clone(), file.to_owned()));
     }
     // These are instances of the scene.
     let refused = |error| Failure::invalid(path, error);
@@ -346,14 +370,14 @@ fn bake_core(
 }
 
 /// The poses of the moving instances, their number from 1, and the line that they stand in.
-pub(super) struct Frame {
-    pub(super) number: usize,
-    pub(super) line: usize,
-    pub(super) poses: Vec<Pose>,
+pub(crate) struct Frame {
+    pub(crate) number: usize,
+    pub(crate) line: usize,
+    pub(crate) poses: Vec<Pose>,
 }
 
 /// Reads the frames of a scene, each with the poses of the moving instances. A scene in which nothing moves has one frame.
-pub(super) fn read_frames(path: Option<&Path>, moving: &[String]) -> Result<Vec<Frame>, Failure> {
+pub(crate) fn read_frames(path: Option<&Path>, moving: &[String]) -> Result<Vec<Frame>, Failure> {
     let path = match (path, moving.is_empty()) {
         (Some(path), false) => path,
         (None, true) => return Ok(vec![Frame { number: 1, line: 0, poses: Vec::new() }]),

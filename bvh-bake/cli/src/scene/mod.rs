@@ -1,9 +1,8 @@
 //! `cbvh scene`: asks a scene of many placed meshes about frames of moving ones.
 
-mod file;
+pub(crate) mod file;
 mod record;
 
-use crate::asking::mesh::is_baked;
 use crate::asking::runner::Run;
 use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure};
@@ -107,14 +106,7 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let mode = arguments.mode;
     let within = asking::within(mode == Mode::Within, arguments.within)?;
     let question = Question { mode, within, all_distances: arguments.list.then_some(backend) };
-    let extension = arguments.scene.extension().unwrap_or_default().to_ascii_lowercase();
-    let is_baked = is_baked(&arguments.scene)?;
-    if !is_baked && (extension == "glb" || extension == "gltf") {
-        let name = arguments.scene.display();
-        return Err(Failure::Invalid(format!(
-            "{name}: expected a scene file, found glTF; bake it first: cbvh bake {name} --scene -o scene.cbvh"
-        )));
-    }
+    let is_baked = file::is_baked_scene(&arguments.scene)?;
     let (mut scene, mut frames) = if is_baked {
         let mut scene = file::open(&arguments.scene, backend)?;
         if arguments.frames.is_none() {

@@ -1,0 +1,39 @@
+//! The page of an assembly: all parts where they stand, and the clashes in their order.
+
+use super::found::Found;
+use super::parts::{Assembly, Part};
+use crate::console::Failure;
+use crate::view::output::name_of;
+use cbvh_view::{Named, Page, Placed, PlacedClash};
+
+/// Returns the page. Parts whose meshes are one file share it.
+pub(super) fn page(assembly: &Assembly, found: &[Found<'_>]) -> Result<Page, Failure> {
+    let placed = |part: &Part| {
+        let shape = part
+            .shape
+            .opened()
+            .map_err(|error| Failure::invalid(&part.file, format_args!("part {:?}: {error}", part.name)))?;
+        Ok(Placed {
+            name: part.name.clone(),
+            of: Named { name: name_of(&part.file), path: part.file.display().to_string(), shape },
+            pose: part.world,
+            margin: part.margin,
+            groups: Some(part.groups),
+            moving: false,
+        })
+    };
+    let placed = assembly.parts.iter().map(placed).collect::<Result<Vec<_>, Failure>>()?;
+    let clashes: Vec<PlacedClash> = found.iter().map(clash).collect();
+    Page::clashes(placed, &clashes).map_err(Failure::from_page)
+}
+
+fn clash(of: &Found<'_>) -> PlacedClash {
+    PlacedClash {
+        pair: of.parts,
+        class: of.class,
+        depth: of.depth,
+        distance: of.distance,
+        point: of.point,
+        translation: of.translation,
+    }
+}
