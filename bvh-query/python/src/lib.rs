@@ -18,6 +18,7 @@ mod robot;
 mod scene;
 mod scene_pairs;
 mod shapes;
+mod view;
 
 use pyo3::prelude::*;
 
@@ -28,6 +29,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<paths::Paths>()?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<scene::Scene>()?;
+    module.add_class::<view::Page>()?;
     macro_rules! functions {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
     }

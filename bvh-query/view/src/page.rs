@@ -114,7 +114,9 @@ impl Page {
         tolerance: Option<f64>,
     ) -> Result<Self, PageError> {
         length("clearance", clearance)?;
-        tolerance.map(|tolerance| length("tolerance", tolerance)).transpose()?;
+        if let Some(found) = tolerance.filter(|tolerance| !(tolerance.is_finite() && *tolerance > 0.0)) {
+            return Err(PageError::Number { name: "tolerance", expected: "a finite length above 0", found });
+        }
         Self::of_both(a, b, |same| Show::Motion { motion: ends, clearance, tolerance, same })
     }
 

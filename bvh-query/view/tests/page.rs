@@ -286,6 +286,7 @@ fn wrong_numbers_and_sizes_are_refused() {
         let refused = Page::scene([instance], Vec::new(), Vec::new(), Vec::new()).unwrap_err();
         assert!(matches!(refused, PageError::Number { name: "margin", .. }), "{refused}");
     }
+    assert!(Page::motion(of(), None, [Pose::IDENTITY; 2], 0.0, Some(0.0)).is_err());
     let bytes = block().bytes().len() as u64;
     assert!(Page::file(of()).unwrap().limited_to(bytes).is_ok());
     let refused = Page::file(of()).unwrap().limited_to(bytes - 1).unwrap_err();

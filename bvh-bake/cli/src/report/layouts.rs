@@ -158,8 +158,15 @@ fn measure(subject: &Subject<'_>, poses: &[Pose]) -> Result<Measured, Failure> {
         tables: tables(&rows),
         rows,
         wrong: judge(&pair.name, &asked),
+        seen: poses.get(nearest(&asked[Layout::reference(TriangleEncoding::F32)][EXACT].answers)).copied(),
         ..Measured::default()
     })
+}
+
+/// Returns the place of the least distance, the first of several.
+fn nearest(distances: &[f64]) -> usize {
+    let least = distances.iter().enumerate().min_by(|(_, one), (_, other)| one.total_cmp(other));
+    least.map_or(0, |(place, _)| place)
 }
 
 /// Asks all layouts all questions. The result is indexed by layout, then by question.

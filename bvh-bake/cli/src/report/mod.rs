@@ -14,11 +14,13 @@ mod ways;
 
 use crate::asking::{self, files};
 use crate::console::{self, Failure, Record, csv, spinner};
+use crate::view::output::{self, name_of};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeReport, Options};
-use bvh_query::{Backend, Bvh, Querier, QueryError};
+use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
 use cbvh_measure::origin::Origin;
 use cbvh_measure::table;
+use cbvh_view::{Named, Page};
 use clap::Args;
 use inputs::{Baked, Pair, bake_both};
 use plot::Panel;
@@ -41,7 +43,8 @@ ones: overlapping, and with gaps of 1e-6, 0.5 %, 1 % and 5 % of A's diagonal. Fo
 too: long motions, short motions, slides and turns on the spot.
 
 The command writes report.html for people, report.svg with its plots, and report.csv and report.json with the same \
-figures. If an answer is wrong, the exit code is 3 and the files are written nevertheless.
+figures. view-1.html shows the first pair as cbvh view does, view-2.html the second one, and so on: in the first pose that touches or else \
+in the nearest one, with --motions where the first hit touches. Pairs whose files have more than 32 MiB have no such page. If an answer is wrong, the exit code is 3 and the files are written nevertheless.
 
 Without --motions, it bakes each pair in every profile with every encoding of triangles, and asks for contact and for \
 distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All answers are compared with those of dop14-f32.
@@ -91,6 +94,8 @@ pub(crate) struct ReportArguments {
 
 /// Rounds and items of `--quick`.
 const QUICK: (usize, usize) = (2, 10);
+/// The most bytes of the files of a pair in a page that shows it, so that the folder of a report stays small.
+const MAX_VIEW_BYTES: u64 = 32 << 20;
 /// The number of items that are made for a pair without any.
 const MADE: usize = 60;
 
@@ -140,6 +145,10 @@ struct Measured {
     sentences: Vec<String>,
     panels: Vec<Panel>,
     tables: Vec<page::Table>,
+    /// The pose that people should see: the first that touches or, if none does, the nearest.
+    seen: Option<Pose>,
+    /// A page that shows the pair, unless it would be large.
+    view: Option<Page>,
 }
 
 /// The whole report: where and how it was measured, and the pairs.
@@ -189,7 +198,12 @@ fn run_kind<T: Clone>(
         };
         let items = spread_evenly(&all, limit);
         let subject = Subject { pair: &pair, meshes: &meshes, baked: &baked, backend, rounds };
-        let measured = (kind.measure)(&subject, &items)?;
+        let mut measured = (kind.measure)(&subject, &items)?;
+        if let Some(pose) = &measured.seen {
+            let [a, b] = subject.named();
+            let page = Page::pair(a, Some(b), pose, None).map_err(Failure::from_page)?;
+            measured.view = page.limited_to(MAX_VIEW_BYTES).ok();
+        }
         report.add(&subject, measured, (kind.items, items.len(), &from));
     }
     spinner.finish_and_clear();
@@ -207,6 +221,22 @@ fn spread_evenly<T: Clone>(all: &[T], count: usize) -> Vec<T> {
 /// Returns the name of a bake's layout, as tables have it.
 fn layout_of(report: &BakeReport) -> String {
     format!("{} {}", report.file.profile.name(), report.file.triangle_encoding.name())
+}
+
+impl Subject<'_> {
+    /// Returns what the files of both meshes are called. Reports are passed on, so that they have no paths of a machine.
+    fn named(&self) -> [Named; 2] {
+        let named = |path: &Path, (bvh, _): &Baked| {
+            let name = name_of(path);
+            Named { path: name.clone(), name, shape: bvh.clone().into() }
+        };
+        [named(&self.pair.a, &self.baked[0]), named(&self.pair.b, &self.baked[1])]
+    }
+}
+
+/// Returns the name of the page that shows a pair, counted from 0.
+fn view_name(number: usize) -> String {
+    format!("view-{}.html", number + 1)
 }
 
 impl Report {
@@ -233,7 +263,7 @@ impl Report {
         self.sections.push(of);
     }
 
-    /// Writes the four files, and prints a summary. Wrong answers are a failure, of which the files tell.
+    /// Writes the four files and the pages that show pairs, and prints a summary. Wrong answers are a failure, of which the files tell.
     fn write(&self, words: &page::Words, out: &Path) -> Result<(), Failure> {
         /// The content of `report.json`.
         #[derive(Serialize)]
@@ -262,6 +292,11 @@ impl Report {
             ("report.html", page::page(self, words)),
         ] {
             files::write_file(&out.join(name), &text)?;
+        }
+        for (number, section) in sections.iter().enumerate() {
+            if let Some(view) = &section.view {
+                output::write(view, &out.join(view_name(number)))?;
+            }
         }
         let counted = |count: usize, word| console::counted(count as u64, word);
         let (pairs, rows) = (counted(sections.len(), "pair"), counted(json.rows.len(), "row"));

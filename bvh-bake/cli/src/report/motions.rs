@@ -11,7 +11,9 @@ use super::ways::{Method, SAMPLES, Said, is_hit, judge};
 use super::{Kind, Measured, Subject, made};
 use crate::asking::files::read_motions;
 use crate::console::{Failure, Record, counted, record};
-use bvh_query::{Backend, Bvh, Motion, MotionAnswer, MotionOptions, Querier, QueryError};
+use bvh_query::{
+    Backend, Bvh, Motion, MotionAnswer, MotionOptions, Pose, Querier, QueryError, RigidPath as _,
+};
 
 pub(super) const KIND: Kind<Motion> = Kind {
     words: Words {
@@ -131,9 +133,19 @@ fn measure(subject: &Subject<'_>, motions: &[Motion]) -> Result<Measured, Failur
         tables: vec![Table { title: title.to_owned(), columns: &COLUMNS, rows: named }],
         rows,
         wrong,
+        seen: seen(motions, &certified),
         counts: vec![("free", free), ("hits", hits), ("undecided", undecided)],
         ..Measured::default()
     })
+}
+
+/// Returns the pose in which the first motion that hits touches or, if none does, the start of the first one.
+fn seen(motions: &[Motion], certified: &[MotionAnswer]) -> Option<Pose> {
+    let hit = motions.iter().zip(certified).find_map(|(motion, answer)| match answer {
+        MotionAnswer::Hit { touching_at, .. } => Some(motion.pose(*touching_at)),
+        _ => None,
+    });
+    hit.or_else(|| motions.first().map(|motion| motion.pose(0.0)))
 }
 
 /// The number of samples that the sentences tell of first.

@@ -1,9 +1,10 @@
-//! `report.html`: one page for people, with sentences, plots and tables. It needs no other file.
+//! `report.html`: one page for people, with sentences, plots and tables. It needs no other file, and links to pages that show the
+//! pairs.
 //!
 //! Each figure of a table carries the value that `report.csv` has for it, and the best ones are bold.
 
 use super::plot;
-use super::{Measured, Report};
+use super::{Measured, Report, view_name};
 use crate::console::{Record, escape, trimmed};
 
 const STYLE: &str = "\
@@ -43,9 +44,13 @@ pub(super) fn page(report: &Report, words: &Words) -> String {
          </head>\n<body>\n<h1>{title}</h1>\n{}",
         opening(report, words)
     );
-    for section in &report.sections {
+    for (number, section) in report.sections.iter().enumerate() {
         let (name, about) = (escape(&section.name), escape(&section.about));
-        page += &format!("<h2 id=\"{name}\">{name}</h2>\n<p>{about}</p>\n{}", list(&section.sentences));
+        let see = section
+            .view
+            .as_ref()
+            .map_or(String::new(), |_| format!(" <a href=\"{}\">See the pair</a>.", view_name(number)));
+        page += &format!("<h2 id=\"{name}\">{name}</h2>\n<p>{about}{see}</p>\n{}", list(&section.sentences));
         page += &plot::svg(&[&section.panels]);
         section.tables.iter().for_each(|table| page += &table.html(section));
     }

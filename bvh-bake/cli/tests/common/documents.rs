@@ -97,7 +97,16 @@ pub(crate) fn same_figures_in_page(page: &[Element], rows: &[Value]) -> usize {
 /// Returns the four files: table, page, JSON and drawing.
 pub(crate) fn report_files(directory: &Path, out: &str) -> [String; 4] {
     let out = directory.join(out);
-    assert_eq!(names(&out), ["report.csv", "report.html", "report.json", "report.svg"]);
+    let (reports, views): (Vec<String>, Vec<String>) =
+        names(&out).into_iter().partition(|name| name.starts_with("report."));
+    assert_eq!(reports, ["report.csv", "report.html", "report.json", "report.svg"]);
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert_eq!(page.matches("See the pair").count(), views.len());
+    for view in views {
+        assert!(page.contains(&format!("<a href=\"{view}\">")), "{view}");
+        let shown = fs::read_to_string(out.join(&view)).unwrap();
+        assert!(shown.contains("id=\"cbvh-content\"") && !shown.contains(directory.to_str().unwrap()));
+    }
     let files = ["csv", "html", "json", "svg"]
         .map(|extension| fs::read_to_string(out.join(format!("report.{extension}"))).unwrap());
     for text in &files {
@@ -115,6 +124,7 @@ pub(crate) fn fetches_nothing(page: &[Element]) {
         assert!(
             name != "script" && name != "link" && outside.iter().all(|key| !attributes.contains_key(*key))
         );
-        assert!(attributes.get("href").is_none_or(|to| to.starts_with('#')));
+        let is_inside = |to: &String| to.starts_with('#') || to.starts_with("view-");
+        assert!(attributes.get("href").is_none_or(is_inside));
     }
 }

@@ -33,6 +33,8 @@ exactly. Touching is contact, and meshes are surfaces, unless they are made soli
 **Shapes.** `sphere`, `capsule`, `box`, `cylinder`, `cone`, `convex_hull`, `cloud`, `voxels`, `octree`, `height_field` and
 `ground` make meshes of simple shapes, and `Mesh.rounded` gives any mesh a radius.
 
+**Seeing.** `Mesh.view` and `Scene.view` make a page that shows meshes, which a notebook shows at once (`View`).
+
 **Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
 ``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. A question is
 about a `Scene` as it is when the question begins, and a path of your own is called on the thread of its question. Arrays
@@ -79,6 +81,7 @@ from ._poses import nearest_pose, pose, relative
 from ._robot import Robot, RobotDistance, RobotMotion
 from ._scene import Scene, _scene_of
 from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
+from ._view import View
 from .manager import CollisionManager
 
 __all__ = [
@@ -118,6 +121,7 @@ __all__ = [
     "SelfContacts",
     "Separation",
     "Side",
+    "View",
     "bake",
     "bake_files",
     "box",

@@ -28,6 +28,7 @@ __all__ = [
     "BakeError",
     "FormatError",
     "Mesh",
+    "Page",
     "Paths",
     "Robot",
     "Scene",
@@ -102,6 +103,27 @@ class Mesh:
     def save(self, path: str) -> None: ...
     def size(self) -> int: ...
     def validate(self) -> None: ...
+
+# A mesh, the name of its file, and its path.
+_Shown = tuple[Mesh, str, str]
+
+@final
+class Page:
+    @staticmethod
+    def file(a: _Shown, max_bytes: int) -> Page: ...
+    @staticmethod
+    def pair(
+        a: _Shown, b: _Shown | None, pose: ArrayLike | None, within: float | None, max_bytes: int
+    ) -> Page: ...
+    @staticmethod
+    def motion(
+        a: _Shown, b: _Shown | None, ends: ArrayLike, clearance: float, tolerance: float | None, max_bytes: int
+    ) -> Page: ...
+    @staticmethod
+    def scene(scene: Scene, files: dict[int, tuple[str, str]], max_bytes: int) -> Page: ...
+    def html(self) -> bytes: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+    def size(self) -> int: ...
 
 @final
 class Paths:

@@ -29,7 +29,8 @@ from ._answers import (
     patches_of,
     regions_of,
 )
-from ._motion import Path, read_paths
+from ._motion import Motion, Path, read_paths
+from ._view import View, called, limit, show
 
 
 def _other(mesh: Mesh) -> _cbvh.Mesh:
@@ -191,6 +192,39 @@ class Mesh:
         """Writes the file, with the radius and the solidity of this mesh. A file of that name is replaced when all is
         written."""
         self._mesh.save(os.fsdecode(path))
+
+    def view(
+        self,
+        other: Mesh | None = None,
+        pose: ArrayLike | None = None,
+        motion: Motion | ArrayLike | None = None,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        within: float | None = None,
+        clearance: float = 0.0,
+        tolerance: float | None = None,
+        max_bytes: int | None = None,
+    ) -> View:
+        """A page that shows this mesh, this mesh and another one, or a motion of the other one. A notebook shows it at once.
+
+        ``pose``: of ``other`` in the frame of this mesh (body to world), shape (4, 4); None is the identity. ``motion``: one
+        `Motion.between`, or its first and last pose, shape (2, 4, 4). If one of both is given and ``other`` is not, this mesh
+        is shown twice. ``within`` also shows whether they are at most that far apart. ``clearance`` and ``tolerance`` are
+        those of `motion`. ``path``: where to save the page. `View.save` saves it later, and `View.open` shows it in the browser.
+
+        The page is one HTML file with the meshes in it. ValueError if they have more than ``max_bytes``, by default 256 MiB.
+        """
+        a = (self._mesh, *called(self._path))
+        b = None if other is None else (_other(other), *called(other._path))
+        most = limit(max_bytes)
+        if motion is not None:
+            if pose is not None or within is not None:
+                raise ValueError("motion: expected no pose or within beside it")
+            ends = motion._ends() if isinstance(motion, Motion) else motion
+            return show(_cbvh.Page.motion(a, b, ends, clearance, tolerance, most), path)
+        if other is None and pose is None and within is None:
+            return show(_cbvh.Page.file(a, most), path)
+        return show(_cbvh.Page.pair(a, b, pose, within, most), path)
 
     def collide(self, other: Mesh, poses: ArrayLike, *, parallel: bool = False) -> Any:
         """Do the surfaces touch? Exact: bool, or an array of bool of shape (N,).

@@ -97,6 +97,14 @@ class Motion(_Own):
         arrays = copied(start, "start"), copied(point, "point"), copied(direction, "direction")
         return Motion(_cbvh.Paths.screw(*arrays, angle, shift), (*arrays, angle, shift))
 
+    def _ends(self) -> Floats:
+        """The first and the last pose of one motion of `between`, which tell all of it, shape (2, 4, 4)."""
+        if self._screw is not None:
+            raise ValueError("motion: expected one of Motion.between, found a screw, which its ends do not tell")
+        if not self._paths.is_one():
+            raise ValueError(f"motion: expected one motion, found {len(self)}; take one of them, such as motions[0]")
+        return self.pose([0.0, 1.0])
+
     def __reduce__(self) -> tuple[Any, ...]:
         if self._screw is not None:
             return (Motion.screw, self._screw)

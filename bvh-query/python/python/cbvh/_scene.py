@@ -34,6 +34,7 @@ from ._answers import (
 )
 from ._mesh import Mesh, _length
 from ._motion import Path, read_path
+from ._view import View, called, limit, show
 
 ALL_GROUPS = 0xFFFF_FFFF
 
@@ -309,6 +310,14 @@ class Scene:
     @tracking.setter
     def tracking(self, tracking: bool) -> None:
         self._scene.set_switches(self._scene.switches()[0], bool(tracking))
+
+    def view(self, path: str | os.PathLike[str] | None = None, *, max_bytes: int | None = None) -> View:
+        """A page that shows the scene as it is, and which pairs touch. A notebook shows it at once, and ``path`` says where to
+        save it. A mesh that many instances have is in the page once. ValueError if the meshes have more than ``max_bytes``, by
+        default 256 MiB."""
+        scene = self.copy()
+        files = {number: called(scene.mesh(number)._path) for number in scene}
+        return show(_cbvh.Page.scene(scene._scene, files, limit(max_bytes)), path)
 
     def collide(self) -> bool:
         """Whether any pair touches, exactly."""
