@@ -172,10 +172,13 @@ fn scenes_have_instances_margins_and_frames() {
     let frames = [format!("{base} {arm}"), format!("{arm} {base}")].map(|frame| numbers(&frame));
     assert_eq!(show["frames"], json!(frames));
     // The files state radius and solidity, so that they are opened as shapes.
-    for (file, word) in [("ball.cbvh", "radius 0.5"), ("table.cbvh", "solid")] {
-        folder.write(file, &files[usize::from(file == "table.cbvh") + 1]);
-        let dump = cbvh_in(&folder, &["dump", file]).done().out;
-        assert!(dump.contains(word), "{dump}");
+    for (file, bytes, radius, solid) in
+        [("ball.cbvh", &files[1], 0.5, false), ("table.cbvh", &files[2], 0.0, true)]
+    {
+        folder.write(file, bytes);
+        let dump = cbvh_in(&folder, &["dump", file, "--json"]).done().json();
+        let object = &dump["objects"][0];
+        assert_eq!((&object["radius"], &object["solid"]), (&radius.into(), &solid.into()), "{object}");
     }
     view(&folder, &["--scene", "cell.scene"]).done();
     let (content, _) = page(&folder);

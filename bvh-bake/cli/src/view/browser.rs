@@ -22,7 +22,11 @@ pub(super) fn show(page: &Page) -> Result<PathBuf, Failure> {
     };
     let all_absolute = std::path::absolute(&all).map_err(failed)?;
     // The folder is removed unless the page is whole.
-    let folder = tempfile::Builder::new().prefix("cbvh-view-").tempdir_in(all_absolute).map_err(failed)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix("cbvh-view-");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+    let folder = builder.tempdir_in(all_absolute).map_err(failed)?;
     let path = folder.path().join(NAME);
     output::write(page, &path)?;
     let _ = folder.keep();
