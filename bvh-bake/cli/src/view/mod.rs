@@ -1,5 +1,6 @@
 //! `cbvh view`: writes a page that shows meshes, a motion or a scene, or shows it in the browser at once.
 
+#[cfg_attr(target_family = "wasm", path = "no_browser.rs")]
 mod browser;
 pub(crate) mod output;
 
