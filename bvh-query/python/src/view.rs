@@ -29,7 +29,8 @@ fn page_error(error: PageError) -> PyErr {
     match error {
         PageError::Shape(error) => query_error(error),
         PageError::TooLarge { .. } => {
-            let remedy = "bake with triangles=\"packed\" or \"quantized\" to make files smaller, or give max_bytes";
+            let remedy =
+                "bake with triangles=\"packed\" or \"quantized\" to make files smaller, or give max_bytes";
             PyValueError::new_err(format!("{error}; {remedy}"))
         }
         error => PyValueError::new_err(error.to_string()),
