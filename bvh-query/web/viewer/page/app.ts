@@ -5,7 +5,7 @@ import type { FileSummary, Place } from "../worker/files.js";
 import { showAbout } from "./about.js";
 import type { Asker } from "./asker.js";
 import { Body, Shown } from "./bodies.js";
-import type { Content, Show } from "./content.js";
+import type { Content, ContentPart, Show } from "./content.js";
 import { bytesOf, countOf, fact, fill, h, type IconName, iconButton, pointOf } from "./dom.js";
 import { Drop } from "./drop.js";
 import { messageOf } from "./errors.js";
@@ -110,18 +110,22 @@ export class App {
     /** Shows the content that the command put into the page. */
     async show(content: Content, packed: string[], onFile: (name: string) => void): Promise<void> {
         this.#content = content;
-        const shown: Shown[] = [];
+        const files: FileSummary[] = [];
         for (const [k, file] of content.files.entries()) {
             onFile(file.name);
-            const summary = await this.asker.ask("openEmbedded", file.name, packed[k] ?? "");
+            files.push(await this.asker.ask("openEmbedded", file.name, packed[k] ?? ""));
             packed[k] = "";
-            shown.push(await Shown.of(summary, this.asker));
         }
         const { show } = content;
         if (show.kind === "scene" || show.kind === "clash") {
+            const shown = await this.#parts(files, show.instances);
             await this.#showScene(shown, show);
             return;
         }
+        const shown = await this.#parts(
+            files,
+            content.files.map((part, file) => ({ ...part, file })),
+        );
         const [first, second = isTwice(content) ? shown[0] : undefined] = shown;
         if (first === undefined) {
             throw new Error("expected a file in this page, found none");
@@ -135,6 +139,28 @@ export class App {
             await this.motion.set(Float64Array.from(show.motion), show.clearance, show.tolerance);
             this.panel.show("motion");
         }
+    }
+
+    /** Reads what is drawn of files: all of a file, or an object of it. Each is read once, however often it is drawn. */
+    async #parts(files: FileSummary[], parts: ({ name: string; file: number } & ContentPart)[]): Promise<Shown[]> {
+        const read = new Map<string, Shown>();
+        const shown: Shown[] = [];
+        for (const { name, file, object = -1, solid = false } of parts) {
+            const whole = files[file];
+            if (whole === undefined) {
+                throw new Error(`${name}: expected a file below ${files.length}, found ${file}`);
+            }
+            const key = `${file} ${object} ${solid}`;
+            let found = read.get(key);
+            if (found === undefined) {
+                const isPart = object >= 0 || solid;
+                const summary = isPart ? await this.asker.ask("openPart", whole.number, object, solid) : whole;
+                found = await Shown.of(summary, this.asker);
+                read.set(key, found);
+            }
+            shown.push(found);
+        }
+        return shown;
     }
 
     /** Shows that there is nothing yet. */
@@ -197,14 +223,9 @@ export class App {
 
     async #showScene(shown: Shown[], show: Extract<Show, { kind: "scene" | "clash" }>): Promise<void> {
         this.mode = "scene";
-        const bodies = show.instances.map((instance) => {
-            const of = shown[instance.file];
-            if (of === undefined) {
-                throw new Error(
-                    `instance ${instance.name}: expected a file below ${shown.length}, found ${instance.file}`,
-                );
-            }
-            return new Body(instance.name, of, this.stage, this.stage.palette.still, instance.margin);
+        const bodies = shown.map((of, k) => {
+            const { name, margin } = show.instances[k] ?? { name: "", margin: 0 };
+            return new Body(name, of, this.stage, this.stage.palette.still, margin);
         });
         const corners = show.instances.flatMap((instance, k) => {
             const [x = 0, y = 0, z = 0] = bodies[k]?.shown.centre ?? [];
@@ -222,7 +243,11 @@ export class App {
             bodies[k]?.setPose(Float64Array.from(instance.pose));
         });
         this.panel.offer(show.kind === "scene" ? ["scene", "inside", "probes"] : ["clash", "inside", "probes"]);
-        await this.scene.set(show);
+        const instances = show.instances.map((instance, k) => ({
+            ...instance,
+            file: shown[k]?.summary.number ?? instance.file,
+        }));
+        await this.scene.set({ ...show, instances });
         this.#offer();
     }
 

@@ -2,12 +2,20 @@
 
 export type Numbers12 = number[];
 
-export interface ContentInstance {
+/** Which part of a file is meant, if it is not all of it as the file says. */
+export interface ContentPart {
+    object?: number;
+    solid?: boolean;
+}
+
+export interface ContentInstance extends ContentPart {
     name: string;
     file: number;
     pose: Numbers12;
     margin: number;
     moving: boolean;
+    member?: number;
+    meets?: number;
 }
 
 export interface ContentClash {
@@ -25,12 +33,18 @@ export type Show =
     | { kind: "file" }
     | { kind: "pair"; pose: Numbers12; within?: number; same?: boolean }
     | { kind: "motion"; motion: number[]; clearance: number; tolerance: number | null; same?: boolean }
-    | { kind: "scene"; instances: ContentInstance[]; allowed: [number, number][]; frames: number[][] }
+    | {
+          kind: "scene";
+          instances: ContentInstance[];
+          allowed: [number, number][];
+          pair_margins?: [number, number, number][];
+          frames: number[][];
+      }
     | { kind: "clash"; instances: ContentInstance[]; clashes: ContentClash[] };
 
 export interface Content {
     version: 1;
-    files: { name: string; path: string; bytes: number }[];
+    files: ({ name: string; path: string; bytes: number } & ContentPart)[];
     show: Show;
     /** Whether there is one file, which is both A and B. */
     same?: boolean;

@@ -84,6 +84,7 @@ export class SceneView {
             "makeScene",
             show.instances.map((instance) => ({ ...instance, pose: Float64Array.from(instance.pose) })),
             show.kind === "scene" ? show.allowed : [],
+            show.kind === "scene" ? (show.pair_margins ?? []) : [],
         );
         if (show.kind === "scene") {
             this.#frames = show.frames;

@@ -526,6 +526,49 @@ test("a scene plays its frames and finds the pairs that touch", { skip: WITHOUT 
     await close();
 });
 
+/** Two boxes with a gap of 3, as two objects. */
+function twoBoxes() {
+    const far = box()
+        .replaceAll(/^v (\S+)/gm, (_, x) => `v ${Number(x) + 4}`)
+        .replaceAll(
+            /^f (.*)$/gm,
+            (_, list) =>
+                `f ${list
+                    .split(" ")
+                    .map((corner) => Number(corner) + 8)
+                    .join(" ")}`,
+        );
+    return `o near\n${box()}o far\n${far}`;
+}
+
+test("pages of the command show objects, scenes and clashes of one file", { skip: WITHOUT }, async () => {
+    const source = written("two.obj", twoBoxes());
+    const [objects, parts, out] = ["objects.cbvh", "parts.cbvh", "two.html"].map((name) => path.join(folder, name));
+    command("bake", source, "-o", objects, "--split-objects");
+    command("bake", source, "-o", parts, "--scene");
+    const view = async (...words) => {
+        command(...words, out);
+        const { page, errors, close } = await open(readFileSync(out, "utf8"));
+        assert.deepEqual([await state(page), errors], ["ready", []]);
+        const triangles = await page.evaluate(() => window.cbvhView.bodies.map((body) => body.shown.summary.triangles));
+        const boxes = await page.evaluate(() => window.cbvhView.bodies.map((body) => [...body.shown.centre]));
+        const found = { ...(await answer(page)), triangles, boxes };
+        await close();
+        return found;
+    };
+
+    const words = ["--object", "far", "--pose", BESIDE.join(" ")];
+    const asked = JSON.parse(command("query", objects, objects, ...words, "--mode", "distance", "--json"));
+    const pair = await view("view", objects, ...words, "-o");
+    assert.deepEqual([pair.distance, pair.triangles, pair.boxes[0]], [asked.distance, [12, 12], [4, 0, 0]]);
+
+    const scene = await view("view", parts, "-o");
+    assert.deepEqual([scene.distance, scene.touching, scene.triangles], [3, 0, [12, 12]]);
+
+    const clash = await view("clash", parts, "--clearance", 4, "--view");
+    assert.deepEqual(clash.triangles, [12, 12]);
+});
+
 test("a clash report frames the chosen pair", { skip: WITHOUT }, async () => {
     const { instances } = scene();
     instances[1].pose = [1, 0, 0, 2.2, 0, 1, 0, 0.1, 0, 0, 1, 0.3];

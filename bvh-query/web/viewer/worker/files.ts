@@ -51,11 +51,15 @@ export class LoadedFile {
     #duplicates: Uint32Array = new Uint32Array();
     /** The place of each id in the drawn order, plus one; one list for each object if the file has no ids. */
     #places: Uint32Array[] | undefined;
+    /** The corners of all triangles, which are kept for the objects that are drawn by themselves. */
+    #positions: Float32Array | undefined;
 
+    /** @param of The file that has the mesh, and the number of the object that the mesh is. */
     constructor(
         readonly number: number,
         readonly name: string,
         readonly mesh: Mesh,
+        private readonly of?: { whole: LoadedFile; object: number },
     ) {
         const [x0 = 0, y0 = 0, z0 = 0, x1 = 0, y1 = 0, z1 = 0] = mesh.bounds;
         this.centre = Float64Array.of((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2);
@@ -67,7 +71,9 @@ export class LoadedFile {
 
     summary(): FileSummary {
         const { number, name, mesh } = this;
-        const closed = this.objects().map((object) => object.closed);
+        const objects =
+            this.of === undefined ? this.objects() : this.objects().slice(this.of.object, this.of.object + 1);
+        const closed = objects.map((object) => object.closed);
         return {
             number,
             name,
@@ -85,11 +91,12 @@ export class LoadedFile {
     /** The objects, as the file states them. */
     objects() {
         const [profiles, encodings, numbers] = raw.objects(this.raw) as [string[], string[], Float64Array];
+        const { names } = this.of?.whole.mesh ?? this.mesh;
         return profiles.map((profile, object) => {
             const of = (place: number) => numbers[10 * object + place] ?? 0;
             const closed = of(9);
             return {
-                name: this.mesh.names[object] ?? "",
+                name: names[object] ?? "",
                 profile,
                 encoding: encodings[object] ?? "",
                 inputTriangles: of(0),
@@ -120,8 +127,14 @@ export class LoadedFile {
 
     /** Reads and checks all triangles. */
     triangles(): Triangles {
-        const { centre } = this;
-        const [x = 0, y = 0, z = 0] = centre;
+        const positions = this.of === undefined ? this.#read() : this.#readObject(this.of.whole, this.of.object);
+        this.#places = undefined;
+        return { centre: this.centre.slice(), positions, pageStarts: this.#pageStarts.slice() };
+    }
+
+    /** Reads the triangles of the file, with corners relative to its centre. */
+    #read(): Float32Array {
+        const [x = 0, y = 0, z = 0] = this.centre;
         const [positions, ids, packets, slots, pageStarts, duplicates] = raw.storedTriangles(this.raw, x, y, z) as [
             Float32Array,
             Uint32Array,
@@ -135,8 +148,21 @@ export class LoadedFile {
         this.#slots = slots;
         this.#pageStarts = pageStarts;
         this.#duplicates = duplicates;
-        this.#places = undefined;
-        return { centre: centre.slice(), positions, pageStarts: pageStarts.slice() };
+        return positions;
+    }
+
+    /** Takes the triangles of an object out of those of its file, which are read once. */
+    #readObject(whole: LoadedFile, object: number): Float32Array {
+        whole.#positions ??= whole.#read();
+        const { firstPage = 0, pages = 0 } = this.objects()[object] ?? {};
+        const [start = 0, end = 0] = [whole.#pageStarts[firstPage], whole.#pageStarts[firstPage + pages]];
+        this.#ids = whole.#ids?.slice(start, end);
+        this.#packets = whole.#packets.slice(start, end);
+        this.#slots = whole.#slots.slice(start, end);
+        this.#pageStarts = whole.#pageStarts.map((place) => Math.min(Math.max(place, start), end) - start);
+        this.#duplicates = whole.#duplicates;
+        const shift = this.centre.map((middle, axis) => middle - (whole.centre[axis] ?? 0));
+        return whole.#positions.slice(9 * start, 9 * end).map((value, k) => value - (shift[k % 3] ?? 0));
     }
 
     /** Where triangles are in the drawn order, given their objects and ids; those that are not drawn are left out. */
@@ -175,8 +201,8 @@ export class LoadedFile {
             return places;
         };
         const hasIds = this.sections().sections.some((section) => section.name === "ids");
-        if (hasIds) {
-            return [list(0, ids.length, this.#duplicates)];
+        if (hasIds || this.of !== undefined) {
+            return [list(0, ids.length, hasIds ? this.#duplicates : new Uint32Array())];
         }
         return this.objects().map(({ firstPage, pages }) => {
             const [start = 0, end = 0] = [this.#pageStarts[firstPage], this.#pageStarts[firstPage + pages]];
@@ -269,6 +295,16 @@ export function add(name: string, bytes: Uint8Array, onStage: (stage: string) =>
     const mesh =
         isBaked || name.toLowerCase().endsWith(".cbvh") ? Mesh.open(bytes) : Mesh.bakeFile(name, bytes, { onStage });
     const added = new LoadedFile(files.length, name, mesh);
+    files.push(added);
+    return added.summary();
+}
+
+/** Opens an object of a file by itself, or all of it as solid. A number below 0 stands for all objects. */
+export function addPart(number: number, object: number, solid: boolean): FileSummary {
+    const whole = file(number);
+    const mesh = object < 0 ? whole.mesh : whole.mesh.object(object);
+    const of = object < 0 ? undefined : { whole, object };
+    const added = new LoadedFile(files.length, whole.name, solid ? mesh.solid() : mesh, of);
     files.push(added);
     return added.summary();
 }

@@ -10,6 +10,9 @@ export interface PlacedInstance {
     pose: Float64Array;
     margin: number;
     moving: boolean;
+    /** The groups of the instance, unless they follow from what moves. */
+    member?: number;
+    meets?: number;
 }
 
 /** What is shown of a frame. */
@@ -31,18 +34,27 @@ function current(): Scene {
     return scene;
 }
 
-/** Makes the scene. Asked are all pairs in which an instance moves, or all if none does. */
-export function make(instances: PlacedInstance[], allowed: [number, number][]): void {
+/** Makes the scene. Asked are all pairs in which an instance moves, or all if none does, unless groups say otherwise. */
+export function make(
+    instances: PlacedInstance[],
+    allowed: [number, number][],
+    pairMargins: [number, number, number][],
+): void {
     scene?.free();
     scene = new Scene();
     const anyMoves = instances.some((instance) => instance.moving);
-    for (const { file: number, pose, margin, moving } of instances) {
-        const groups = { member: moving ? MOVING : STILL, meets: moving || !anyMoves ? MOVING | STILL : MOVING };
-        const added = scene.add(file(number).mesh, pose, groups);
+    for (const { file: number, pose, margin, moving, member, meets } of instances) {
+        const added = scene.add(file(number).mesh, pose, {
+            member: member ?? (moving ? MOVING : STILL),
+            meets: meets ?? (moving || !anyMoves ? MOVING | STILL : MOVING),
+        });
         scene.setMargin(added, margin);
     }
     for (const [a, b] of allowed) {
         scene.setAllowed(a, b);
+    }
+    for (const [a, b, margin] of pairMargins) {
+        scene.setPairMargin(a, b, margin);
     }
 }
 

@@ -36,6 +36,7 @@ const handlers = {
     },
     openEmbedded: async (name: string, packed: string) => files.add(name, await unpack(packed), tell),
     open: (name: string, bytes: ArrayBuffer) => files.add(name, new Uint8Array(bytes), tell),
+    openPart: files.addPart,
     bytes: (file: number) => files.file(file).mesh.bytes(),
     triangles: (file: number) => files.file(file).triangles(),
     place: (file: number, triangle: number) => files.file(file).place(triangle),
