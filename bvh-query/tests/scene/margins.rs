@@ -58,10 +58,11 @@ fn pairs<'a>(
 
 #[test]
 fn every_question_respects_every_margin() {
-    let mut random = Random::new(21);
     let shapes = shapes();
     let mut seen = [0; 4];
-    for round in 0..rounds(12) {
+    // All of them see the same, however many backends this CPU has.
+    let scenes_per_round = scenes().len() as u32;
+    for round in 0..rounds(24) {
         for scene in &mut scenes() {
             let mut random = Random::new(1000 + round);
             let mut placed = Vec::new();
@@ -98,7 +99,7 @@ fn every_question_respects_every_margin() {
             check_pairs(scene, &placed, &HashMap::new(), allowed, &mut seen);
         }
     }
-    assert!(seen.iter().all(|&count| count > 10) && random.unit() < 1.0, "{seen:?}");
+    assert!(seen.iter().all(|&count| count >= 2 * scenes_per_round), "{scenes_per_round} scenes: {seen:?}");
 }
 
 fn check_pairs(
