@@ -3,6 +3,7 @@
 use crate::error::{NumberError, QueryError};
 use crate::file::bvh::Bvh;
 use bvh_format::object::{MAX_RADIUS, Object};
+use std::ops::Range;
 
 impl Bvh {
     /// Returns the number of the first object with this name.
@@ -59,6 +60,11 @@ impl<'a> Shape<'a> {
     /// Returns the objects of the shape.
     pub fn objects(&self) -> &'a [Object] {
         &self.bvh.objects()[self.first..self.end]
+    }
+
+    /// Returns the numbers that these objects have in the file.
+    pub fn object_numbers(&self) -> Range<usize> {
+        self.first..self.end
     }
 
     /// Returns the number of triangles stored for all objects of the shape.

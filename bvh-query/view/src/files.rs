@@ -110,15 +110,14 @@ impl File {
 /// Returns the shape of all of a file, and which part of that a shape is.
 fn whole_and_part(shape: &OwnedShape) -> Result<(OwnedShape, Part), QueryError> {
     let of_shape = shape.shape();
-    let (all, found) = (shape.bvh().objects(), of_shape.objects());
-    if all.len() == found.len() {
+    let numbers = of_shape.object_numbers();
+    if numbers.len() == shape.bvh().objects().len() {
         // The file may state what the shape is.
         return Ok((shape.clone(), Part::default()));
     }
     let whole = OwnedShape::from(shape.bvh().clone());
     let is_solid = whole.shape().is_solid();
-    let object = found.first().and_then(|first| all.iter().position(|object| ptr::eq(object, first)));
-    let part = Part { object, solid: of_shape.is_solid() && !is_solid };
+    let part = Part { object: Some(numbers.start), solid: of_shape.is_solid() && !is_solid };
     let same_radius = whole.shape().radius() == of_shape.radius();
     Ok((if same_radius { whole } else { whole.rounded(of_shape.radius())? }, part))
 }

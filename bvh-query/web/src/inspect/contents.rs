@@ -4,7 +4,7 @@ use crate::answers::{floats, ids};
 use crate::arguments::{Answer, refused};
 use crate::inspect::tree::visit;
 use crate::mesh::Mesh;
-use bvh_format::header::version_name;
+use bvh_format::header::{head_bytes, version_name};
 use js_sys::{Array, JsString};
 use wasm_bindgen::prelude::*;
 
@@ -12,13 +12,14 @@ fn strings(of: impl Iterator<Item = String>) -> JsValue {
     of.map(|text| JsValue::from(JsString::from(text))).collect::<Array>().into()
 }
 
-/// The version of the format, then of each section: its name, its first byte and its length.
+/// The version of the format and the length of the header, then of each section: its name, its first byte and its length.
 #[wasm_bindgen]
 pub fn sections(mesh: &Mesh) -> Array {
     let layout = mesh.shape.bvh().layout();
     let sections = || layout.sections.iter();
     [
         JsValue::from(version_name(layout.version)),
+        JsValue::from(head_bytes(layout.sections.len()) as f64),
         strings(sections().map(|section| section.kind.name().to_owned())),
         floats(sections().map(|section| section.range.start as f64)),
         floats(sections().map(|section| section.range.len() as f64)),
@@ -27,7 +28,7 @@ pub fn sections(mesh: &Mesh) -> Array {
     .collect()
 }
 
-/// Of each object: its profile, the encoding of its triangles, the numbers of its input triangles, triangles, degenerate
+/// Of each object of the file: its profile, the encoding of its triangles, the numbers of its input triangles, triangles, degenerate
 /// triangles, duplicates, treelets, packets and pages, its first page, its slabs, and whether it is closed: 1, 0, or -1 if
 /// the file does not say so.
 #[wasm_bindgen]
@@ -59,7 +60,14 @@ pub fn objects(mesh: &Mesh) -> Array {
     .collect()
 }
 
-/// For each object and level, four numbers: treelets, children, leaf packets, triangles in these. The numbers of levels of the
+/// The numbers of the first object of the mesh, and of the one after its last.
+#[wasm_bindgen(js_name = objectNumbers)]
+pub fn object_numbers(mesh: &Mesh) -> JsValue {
+    let numbers = mesh.shape.shape().object_numbers();
+    ids([numbers.start as u32, numbers.end as u32].into_iter())
+}
+
+/// For each object of the file and level, four numbers: treelets, children, leaf packets, triangles in these. The numbers of levels of the
 /// objects come first.
 #[wasm_bindgen(js_name = levelCounts)]
 pub fn level_counts(mesh: &Mesh) -> Answer<Array> {
@@ -74,7 +82,7 @@ pub fn level_counts(mesh: &Mesh) -> Answer<Array> {
         levels[level].iter_mut().zip(add).for_each(|(sum, add)| *sum += add);
     };
     visit(
-        bvh,
+        bvh.all(),
         |object, level| count(object, level, [1.0, 0.0, 0.0, 0.0]),
         |node| {
             let triangles = node.triangles();

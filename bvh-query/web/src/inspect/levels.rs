@@ -4,7 +4,7 @@ use crate::answers::{ids, small};
 use crate::arguments::{Answer, refused};
 use crate::inspect::tree::{page, visit};
 use crate::mesh::Mesh;
-use bvh_format::kdop::Kdop;
+use bvh_format::kdop::{DIRECTIONS, Kdop};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::turning::TurningSlab;
 use js_sys::{Array, Float32Array, Float64Array};
@@ -29,11 +29,18 @@ fn write(slabs: &NodeSlabs, count: usize, turning: Option<TurningSlab>) -> [f32;
     numbers
 }
 
+/// The fixed directions of the format, three numbers for each.
+#[wasm_bindgen]
+pub fn directions() -> Float64Array {
+    Float64Array::from(&DIRECTIONS.map(|direction| direction.map(f64::from)).as_flattened()[..])
+}
+
 /// The nodes of a level, at most `most` of them: for each, 31 numbers in the frame of its object, the object, the page and the slot
-/// or packet, and the number of triangles of a packet, or 0. The origins of all objects come last. Level 0 has the roots.
+/// or packet, and the number of triangles of a packet, or 0. The origins of all objects of the file come last. Level 0 has the
+/// roots.
 #[wasm_bindgen(js_name = levelNodes)]
 pub fn level_nodes(mesh: &Mesh, level: usize, most: usize) -> Answer<Array> {
-    let bvh = mesh.shape.bvh();
+    let (shape, bvh) = (mesh.shape.shape(), mesh.shape.bvh());
     let (mut numbers, mut objects, mut places, mut triangles) = (vec![], vec![], vec![], vec![]);
     let mut put = |object: usize, of: [f32; NODE_NUMBERS], at: (u32, u16), count: u8| {
         if objects.len() < most {
@@ -45,14 +52,14 @@ pub fn level_nodes(mesh: &Mesh, level: usize, most: usize) -> Answer<Array> {
     };
     let slabs = |object: usize| bvh.objects()[object].profile().directions().slabs();
     if level == 0 {
-        for (number, object) in bvh.objects().iter().enumerate() {
+        for (number, object) in shape.object_numbers().zip(shape.objects()) {
             let first = object.pages().start;
             let root = page(bvh, object, first).map_err(refused)?.anchor_slabs(0);
             put(number, write(&root, slabs(number), None), (first, 0), 0);
         }
     } else {
         visit(
-            bvh,
+            shape,
             |_, _| {},
             |node| {
                 let packet = node.triangles();

@@ -1,4 +1,4 @@
-//! Visits all nodes of a file with their levels, page by page.
+//! Visits all nodes of a shape with their levels, page by page.
 //!
 //! Links lead only to later pages, so that one pass is enough. It keeps the levels of roots whose pages come later.
 
@@ -9,7 +9,7 @@ use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::Child;
 use bvh_format::turning::{TurningSlab, decode_turning};
 use bvh_format::{FormatError, Rule};
-use bvh_query::Bvh;
+use bvh_query::{Bvh, Shape};
 use std::collections::HashMap;
 
 /// A node: a child of a treelet.
@@ -60,11 +60,12 @@ pub(super) fn page<'a>(bvh: &'a Bvh, object: &Object, number: u32) -> Result<Pag
 
 /// Visits all nodes but the roots of objects. `treelet` is called with the object and the level of each treelet.
 pub(super) fn visit(
-    bvh: &Bvh,
+    shape: Shape<'_>,
     mut treelet: impl FnMut(usize, usize),
     mut node: impl FnMut(&Node<'_>),
 ) -> Result<(), FormatError> {
-    for (number, object) in bvh.objects().iter().enumerate() {
+    let bvh = shape.bvh();
+    for (number, object) in shape.object_numbers().zip(shape.objects()) {
         // By page and root.
         let mut ahead: HashMap<(u32, u8), usize> = HashMap::new();
         for page_number in object.pages() {

@@ -1,4 +1,4 @@
-//! All triangles in the order of the file, as the page draws them, and where each one is stored.
+//! All triangles of a mesh in the order of the file, as the page draws them, and where each one is stored.
 
 use crate::answers::ids;
 use crate::arguments::{Answer, refused, room};
@@ -23,19 +23,19 @@ fn packets<'a>(page: &'a Page<'a>) -> impl Iterator<Item = (u8, u16, usize)> + '
 }
 
 /// The corners of all stored triangles in the order of the file, nine coordinates for each, less a point; the id of each; its
-/// packet in its page; the slot of the treelet that has the packet; for each page of the file, the number of the triangles before
+/// packet in its page; the slot of the treelet that has the packet; for each page of the mesh, the number of the triangles before
 /// it, and all at the end; and pairs of a stored id and the id of a duplicate.
 #[wasm_bindgen(js_name = storedTriangles)]
 pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
-    let (bvh, point) = (mesh.shape.bvh(), [x, y, z]);
+    let (shape, bvh, point) = (mesh.shape.shape(), mesh.shape.bvh(), [x, y, z]);
     let layout = bvh.layout();
-    let count: u64 = bvh.objects().iter().map(|object| object.triangles()).sum();
+    let count = shape.triangles();
     // A forged file may state any number, so what it holds decides.
     let count = usize::try_from(count).unwrap_or(usize::MAX).min(bvh.bytes().len());
     let mut corners: Vec<[[f32; 3]; 3]> = room("triangles", [[0.0; 3]; 3], count)?;
     corners.clear();
     let (mut numbers, mut in_page, mut slots, mut before) = (vec![], vec![], vec![], vec![]);
-    for object in bvh.objects() {
+    for object in shape.objects() {
         let origin = object.origin();
         for number in object.pages() {
             before.push(corners.len() as u32);

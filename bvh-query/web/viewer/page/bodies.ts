@@ -131,6 +131,11 @@ export class Shown {
         return this.positions.length / 9;
     }
 
+    /** Whether the drawn order has a triangle of this number. */
+    has(place: number): boolean {
+        return Number.isInteger(place) && place >= 0 && place < this.triangles;
+    }
+
     /** The nine coordinates of a triangle, less the centre. */
     triangle(place: number): Float32Array {
         return this.positions.subarray(9 * place, 9 * place + 9);

@@ -46,8 +46,6 @@ export interface Content {
     version: 1;
     files: ({ name: string; path: string; bytes: number } & ContentPart)[];
     show: Show;
-    /** Whether there is one file, which is both A and B. */
-    same?: boolean;
 }
 
 /** Returns the content of the page, or `undefined` of a page that is not filled. The text is removed, to free its memory. */

@@ -1,8 +1,9 @@
 /** Takes files that are dropped on the page or chosen: meshes are baked by the worker. */
 
-import type { App } from "./app.js";
+import type { FileSummary } from "../worker/files.js";
 import { h } from "./dom.js";
 import { describe, messageOf } from "./errors.js";
+import type { View } from "./view.js";
 
 const ACCEPTED = ".cbvh,.obj,.stl,.ply,.glb,.gltf,.xyz,.pcd";
 
@@ -25,7 +26,11 @@ export class Drop {
         ),
     );
 
-    constructor(readonly app: App) {
+    /** @param adopt Shows a file that was opened. */
+    constructor(
+        readonly view: View,
+        readonly adopt: (file: FileSummary) => Promise<void>,
+    ) {
         document.body.append(this.#input, this.#shade);
         this.#input.addEventListener("change", () => {
             const files = [...(this.#input.files ?? [])];
@@ -63,21 +68,21 @@ export class Drop {
     /** Opens or bakes files, one after the other. */
     async take(files: File[]): Promise<void> {
         for (const file of files) {
-            const busy = this.app.messages.busy(file.name);
+            const busy = this.view.messages.busy(file.name);
             busy.stage("reading");
             try {
                 const bytes = await file.arrayBuffer();
-                const summary = await this.app.asker.askInStages(
+                const summary = await this.view.asker.askInStages(
                     (stage) => busy.stage(stage),
                     "open",
                     file.name,
                     bytes,
                 );
                 busy.stage("drawing");
-                await this.app.take(summary);
+                await this.adopt(summary);
             } catch (error) {
                 document.documentElement.dataset.message = `${file.name}: ${messageOf(error)}`;
-                this.app.messages.say(describe(file.name, messageOf(error)), "error");
+                this.view.messages.say(describe(file.name, messageOf(error)), "error");
             } finally {
                 busy.end();
             }

@@ -13,7 +13,7 @@ interface Breach {
     remedy: string;
 }
 
-export function breachOf(message: string): Breach | undefined {
+function breachOf(message: string): Breach | undefined {
     const found = /^(.*?)byte (\d+): (R\d+) \((.*?)\): expected (.*), found (.*); ([^;]*)$/s.exec(message);
     if (found === null) {
         return undefined;

@@ -13,33 +13,21 @@ import {
 } from "three";
 import type { Polyhedra, Slabs } from "../worker/polyhedra.js";
 import type { Handlers } from "../worker/worker.js";
-import type { App } from "./app.js";
 import type { Body } from "./bodies.js";
+import { type Contents, describeContents } from "./breakdown.js";
 import { distinct, heat } from "./colours.js";
-import { bytesOf, countOf, fact, fill, h, milliseconds } from "./dom.js";
+import { countOf, fact, fill, h, milliseconds } from "./dom.js";
 import { describe, messageOf } from "./errors.js";
+import type { Look } from "./look.js";
+import type { Pair } from "./pair.js";
 import { part } from "./panel.js";
+import type { View } from "./view.js";
 
-type Contents = ReturnType<Handlers["contents"]>;
 type Visits = ReturnType<Handlers["visits"]>;
 type Paint = "plain" | "pages" | "packets" | "visits";
 
 /** More nodes than this are not drawn. */
 const MAX_NODES = 20_000;
-/** The colours of sections in the bar, as CSS. */
-const SECTION_COLOURS: Record<string, string> = {
-    header: "#94a3b8",
-    objects: "#64748b",
-    nodes: "#3b82f6",
-    leaves: "#f59e0b",
-    ids: "#10b981",
-    duplicates: "#14b8a6",
-    provenance: "#a78bfa",
-    instances: "#f472b6",
-    topology: "#fb7185",
-    "between sections": "#cbd5e1",
-};
-
 /** The place in the scale of heat: nothing, opened but not tested, or tested. */
 const heatOf = (tested: number, most: number, isMet: boolean): number =>
     tested > 0 ? 0.4 + (0.6 * Math.log1p(tested)) / Math.log1p(most) : isMet ? 0.2 : 0;
@@ -90,21 +78,25 @@ export class Inside {
     #asked = 0;
     #painted: Paint = "plain";
 
-    constructor(readonly app: App) {
-        app.stage.scene.add(this.#group);
-        this.#page = app.panel.add("inside", "Inside", (shown) => {
+    constructor(
+        readonly view: View,
+        readonly pair: Pair,
+        readonly look: Look,
+    ) {
+        view.stage.scene.add(this.#group);
+        this.#page = view.panel.add("inside", "Inside", (shown) => {
             this.#isShown = shown;
             this.#group.visible = shown;
             void this.#show();
         });
         this.#choice.addEventListener("change", () => void this.#show());
-        this.#level.addEventListener("input", () => void this.#drawLevel());
-        this.#slabs.addEventListener("change", () => void this.#drawLevel());
-        this.#paint.addEventListener("change", () => void this.#repaint());
-        this.#question.addEventListener("change", () => void this.#repaint());
-        app.pair.onAnswer.push(() => {
-            if (this.#isShown && this.#paint.value === "visits" && !app.handles.isDragging) {
-                void this.#repaint();
+        this.#level.addEventListener("input", () => this.#try(() => this.#drawLevel()));
+        this.#slabs.addEventListener("change", () => this.#try(() => this.#drawLevel()));
+        this.#paint.addEventListener("change", () => this.#try(() => this.#repaint()));
+        this.#question.addEventListener("change", () => this.#try(() => this.#repaint()));
+        pair.onAnswer.push(() => {
+            if (this.#isShown && this.#paint.value === "visits" && !view.handles.isDragging) {
+                this.#try(() => this.#repaint());
             }
             this.#placeGroup();
         });
@@ -123,12 +115,16 @@ export class Inside {
         );
     }
 
-    #bodies(): Body[] {
-        return this.app.bodies;
+    /** Says why a question has no answer: a file may be damaged where nobody has looked yet. */
+    #try(work: () => Promise<void>): void {
+        work().catch((error: unknown) => {
+            const name = this.#body()?.shown.summary.name ?? "";
+            this.view.messages.say(describe(name, messageOf(error)), "error");
+        });
     }
 
     #body(): Body | undefined {
-        return this.#bodies()[Number(this.#choice.value)] ?? this.#bodies()[0];
+        return this.view.bodies[Number(this.#choice.value)] ?? this.view.bodies[0];
     }
 
     /** Adopts the files on the stage. */
@@ -136,7 +132,7 @@ export class Inside {
         this.#known.clear();
         this.#visits = undefined;
         this.#clearNodes();
-        const bodies = this.#bodies();
+        const bodies = this.view.bodies;
         const seen = new Set<number>();
         fill(
             this.#choice,
@@ -150,7 +146,7 @@ export class Inside {
         );
         this.#paint.value = "plain";
         this.#slabs.value = "none";
-        this.#paint.options[3]?.toggleAttribute("disabled", !this.app.pair.isComplete);
+        this.#paint.options[3]?.toggleAttribute("disabled", !this.pair.isComplete);
         if (this.#isShown) {
             void this.#show();
         }
@@ -158,7 +154,7 @@ export class Inside {
 
     async #show(): Promise<void> {
         if (!this.#isShown) {
-            await this.#repaint();
+            this.#try(() => this.#repaint());
             return;
         }
         const body = this.#body();
@@ -166,7 +162,7 @@ export class Inside {
             return;
         }
         try {
-            const known = this.#known.get(body.file) ?? (await this.app.asker.ask("contents", body.file));
+            const known = this.#known.get(body.file) ?? (await this.view.asker.ask("contents", body.file));
             this.#known.set(body.file, known);
             this.#showContents(body, known);
             await this.#drawLevel();
@@ -184,129 +180,21 @@ export class Inside {
             this.#level.dataset.file = String(body.file);
             this.#level.value = String(Math.min(3, depth));
         }
-        const parts = contents.sections.map(({ name, bytes }) => ({ name, bytes }));
-        const first = Math.min(...contents.sections.map(({ start }) => start), summary.bytes);
-        const known = parts.reduce((sum, { bytes }) => sum + bytes, 0);
-        const head = { name: "header", bytes: Math.min(first, 64 + 32 * contents.sections.length) };
-        const gaps = { name: "between sections", bytes: summary.bytes - known - head.bytes };
-        const all = [head, ...parts, gaps].filter(({ bytes }) => bytes > 0);
-        const triangles = Math.max(summary.triangles, 1);
-        const colour = (name: string) => SECTION_COLOURS[name] ?? "#8b949e";
-        const bar = h(
-            "div",
-            { class: "bar", role: "img", "aria-label": "Bytes by kind" },
-            ...all.map(({ name, bytes }) =>
-                h("span", {
-                    style: `flex:${bytes} 0 0;background:${colour(name)}`,
-                    title: `${name}: ${bytesOf(bytes)}`,
-                }),
-            ),
-        );
-        const cells = (tag: "td" | "th", ...texts: (string | HTMLElement)[]) => texts.map((text) => h(tag, {}, text));
-        const table = h(
-            "table",
-            {},
-            h("thead", {}, h("tr", {}, ...cells("th", "kind", "bytes", "per triangle", "share"))),
-            h(
-                "tbody",
-                {},
-                ...all.map(({ name, bytes }) =>
-                    h(
-                        "tr",
-                        {},
-                        h("td", {}, h("i", { class: "swatch", style: `background:${colour(name)}` }), name),
-                        ...cells(
-                            "td",
-                            countOf(bytes),
-                            (bytes / triangles).toFixed(2),
-                            `${((100 * bytes) / summary.bytes).toFixed(1)} %`,
-                        ),
-                    ),
-                ),
-            ),
-        );
-        let before = 0;
-        const objects = contents.objects.map((object, number) => {
-            const levels = contents.levelLengths[number] ?? 0;
-            const counts = contents.levelCounts.subarray(4 * before, 4 * (before + levels));
-            before += levels;
-            const rows = Array.from({ length: levels }, (_, level) => {
-                const [treelets = 0, children = 0, packets = 0, inPackets = 0] = counts.subarray(
-                    4 * level,
-                    4 * level + 4,
-                );
-                return h(
-                    "tr",
-                    {},
-                    ...cells(
-                        "td",
-                        String(level),
-                        countOf(treelets),
-                        treelets > 0 ? (children / treelets).toFixed(2) : "",
-                        countOf(packets),
-                        packets > 0 ? (inPackets / packets).toFixed(2) : "",
-                    ),
-                );
-            });
-            const closed = object.closed === undefined ? "not stated" : object.closed ? "yes" : "no";
-            return h(
-                "details",
-                { open: contents.objects.length === 1 },
-                h("summary", {}, object.name === "" ? `object ${number}` : object.name),
-                h(
-                    "dl",
-                    { class: "facts" },
-                    fact("profile", object.profile),
-                    fact("triangles as", object.encoding),
-                    fact("triangles", countOf(object.triangles)),
-                    object.duplicates > 0 && fact("exact duplicates", countOf(object.duplicates)),
-                    object.degenerate > 0 && fact("without area", countOf(object.degenerate)),
-                    fact("closed", closed),
-                    fact("pages", countOf(object.pages)),
-                    fact("treelets", countOf(object.treelets)),
-                    fact("leaf packets", countOf(object.packets)),
-                    fact("depth", String(levels)),
-                ),
-                h(
-                    "table",
-                    {},
-                    h(
-                        "thead",
-                        {},
-                        h("tr", {}, ...cells("th", "level", "treelets", "children", "packets", "triangles")),
-                    ),
-                    h("tbody", {}, ...rows),
-                ),
-            );
-        });
         const check = h(
             "button",
             { type: "button", class: "button", click: () => void this.#validate(body) },
             "Check the whole file",
         );
-        fill(
-            this.#contents,
-            part(
-                "Bytes",
-                h("p", { class: "muted" }, `${bytesOf(summary.bytes)}, format ${contents.version}`),
-                bar,
-                table,
-                check,
-            ),
-            part(
-                contents.objects.length === 1 ? "Object" : `${contents.objects.length} objects`,
-                ...objects.slice(0, 200),
-            ),
-        );
+        fill(this.#contents, ...describeContents(summary, contents, check));
     }
 
     async #validate(body: Body): Promise<void> {
         const { name } = body.shown.summary;
         try {
-            await this.app.asker.ask("validate", body.file);
-            this.app.messages.say(`${name} keeps all rules of the format.`);
+            await this.view.asker.ask("validate", body.file);
+            this.view.messages.say(`${name} keeps all rules of the format.`);
         } catch (error) {
-            this.app.messages.say(describe(name, messageOf(error)), "error");
+            this.view.messages.say(describe(name, messageOf(error)), "error");
         }
     }
 
@@ -324,7 +212,7 @@ export class Inside {
     #placeGroup(): void {
         const body = this.#body();
         if (body !== undefined) {
-            this.app.stage.place(this.#group, body.pose, body.shown.centre);
+            this.view.stage.place(this.#group, body.pose, body.shown.centre);
         }
     }
 
@@ -340,17 +228,17 @@ export class Inside {
         if (slabs === "none") {
             this.#clearNodes();
             fill(this.#nodesBox);
-            this.app.stage.draw();
+            this.view.stage.draw();
             return;
         }
-        const found = await this.app.asker.ask("level", body.file, level, MAX_NODES + 1, slabs as Slabs);
+        const found = await this.view.asker.ask("level", body.file, level, MAX_NODES + 1, slabs as Slabs);
         if (number !== this.#asked) {
             return;
         }
         this.#clearNodes();
         if (found.count > MAX_NODES) {
             fill(this.#nodesBox, `More than ${countOf(MAX_NODES)} nodes, which are not drawn. Choose a level above.`);
-            this.app.stage.draw();
+            this.view.stage.draw();
             return;
         }
         this.#polyhedra = found;
@@ -389,8 +277,8 @@ export class Inside {
         const faces = new Uint8Array(found.positions.length);
         const edges = new Uint8Array(found.edges.length);
         const colour = new Color();
-        const amber = new Color(this.app.stage.palette.b);
-        const box = new Color(this.app.stage.palette.box);
+        const amber = new Color(this.view.stage.palette.b);
+        const box = new Color(this.view.stage.palette.box);
         const counts = this.#paint.value === "visits" ? this.#countsOfNodes(found) : undefined;
         const most = counts === undefined ? 1 : Math.max(1, ...counts);
         const put = (to: Uint8Array, start: number, end: number, of: Color) => {
@@ -422,7 +310,7 @@ export class Inside {
 
     #countsOfNodes(found: Polyhedra): Uint32Array {
         const body = this.#body();
-        const side = body === this.app.pair.b ? this.#visits?.b : this.#visits?.a;
+        const side = body === this.pair.b ? this.#visits?.b : this.#visits?.a;
         const counts = new Uint32Array(found.count);
         if (side === undefined) {
             return counts;
@@ -450,10 +338,10 @@ export class Inside {
         }
         this.#painted = paint;
         fill(this.#visitsBox);
-        const { pair } = this.app;
+        const { pair } = this;
         if (paint === "visits" && pair.a !== undefined && pair.b !== undefined) {
             const began = performance.now();
-            this.#visits = await this.app.asker.ask(
+            this.#visits = await this.view.asker.ask(
                 "visits",
                 pair.a.side,
                 pair.b.side,
@@ -463,16 +351,16 @@ export class Inside {
             this.#showVisits(this.#visits, performance.now() - began);
         }
         const known = new Map<number, BufferAttribute>();
-        for (const body of this.#bodies()) {
+        for (const body of this.view.bodies) {
             if (paint === "plain" || body.shown.boxLevel !== undefined) {
-                body.paint(undefined, this.app.colourOf(body));
+                body.paint(undefined, this.look.colourOf(body));
                 continue;
             }
             // What is counted differs between both sides of a question, even if they are one file.
             const colours =
                 (paint === "visits" ? undefined : known.get(body.file)) ?? (await this.#coloursOf(body, paint));
             known.set(body.file, colours);
-            body.paint(colours, this.app.colourOf(body));
+            body.paint(colours, this.look.colourOf(body));
         }
         if (this.#polyhedra !== undefined) {
             const { faces, edges } = this.#nodeColours(this.#polyhedra);
@@ -480,7 +368,7 @@ export class Inside {
             drawn.geometry.setAttribute("color", new BufferAttribute(faces, 3, true));
             lines.geometry.setAttribute("color", new BufferAttribute(edges, 3, true));
         }
-        this.app.stage.draw();
+        this.view.stage.draw();
     }
 
     async #coloursOf(body: Body, paint: Paint): Promise<BufferAttribute> {
@@ -509,12 +397,12 @@ export class Inside {
                 }
             }
         } else if (paint === "packets") {
-            const numbers = await this.app.asker.ask("packets", body.file);
+            const numbers = await this.view.asker.ask("packets", body.file);
             numbers.forEach((number, triangle) => {
                 put(triangle, number, () => distinct(number, colour));
             });
         } else {
-            const side = body === this.app.pair.b ? this.#visits?.b : this.#visits?.a;
+            const side = body === this.pair.b ? this.#visits?.b : this.#visits?.a;
             const { tested = new Uint32Array(), opened = new Uint32Array() } = side ?? {};
             let most = 1;
             for (const count of tested) {
@@ -564,17 +452,18 @@ export class Inside {
 
     /** Draws what a link names. */
     restore(values: { draw?: string; level?: string; paint?: string }): void {
-        if (values.draw !== undefined) {
-            this.#slabs.value = values.draw;
-        }
-        if (values.paint !== undefined) {
-            this.#paint.value = values.paint;
-        }
-        const file = this.#body()?.file;
-        if (values.level !== undefined && file !== undefined) {
+        const choose = (from: HTMLSelectElement, value: string | undefined) => {
+            if ([...from.options].some((option) => option.value === value && !option.disabled)) {
+                from.value = value ?? "";
+            }
+        };
+        choose(this.#slabs, values.draw);
+        choose(this.#paint, values.paint);
+        const [file, level] = [this.#body()?.file, Number(values.level)];
+        if (file !== undefined && Number.isInteger(level) && level >= 0) {
             this.#level.dataset.file = String(file);
-            this.#level.max = values.level;
-            this.#level.value = values.level;
+            this.#level.max = String(level);
+            this.#level.value = String(level);
         }
     }
 

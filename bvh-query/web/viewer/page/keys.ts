@@ -3,6 +3,7 @@
 import { Vector3 } from "three";
 import type { App } from "./app.js";
 import { h } from "./dom.js";
+import { copyCommand } from "./link.js";
 import { dialog } from "./panel.js";
 import { fromQuaternion, move, placedAt, position, product, turn } from "./pose.js";
 
@@ -27,20 +28,20 @@ const isArrow = (event: KeyboardEvent) => ARROWS[event.key] !== undefined;
 
 /** Moves or turns B in the plane of the picture. */
 function nudge(app: App, event: KeyboardEvent, step: number): void {
-    const body = app.handles.body;
+    const body = app.view.handles.body;
     if (body === undefined) {
         return;
     }
     const [x, y] = ARROWS[event.key] ?? [0, 0];
     const away = event.key === "PageUp" ? -1 : event.key === "PageDown" ? 1 : 0;
-    const right = new Vector3().setFromMatrixColumn(app.stage.camera.matrixWorld, 0);
-    const up = new Vector3().setFromMatrixColumn(app.stage.camera.matrixWorld, 1);
-    const back = new Vector3().setFromMatrixColumn(app.stage.camera.matrixWorld, 2);
+    const right = new Vector3().setFromMatrixColumn(app.view.stage.camera.matrixWorld, 0);
+    const up = new Vector3().setFromMatrixColumn(app.view.stage.camera.matrixWorld, 1);
+    const back = new Vector3().setFromMatrixColumn(app.view.stage.camera.matrixWorld, 2);
     const along = right.multiplyScalar(x).addScaledVector(up, y).addScaledVector(back, away);
     const { pose } = body;
-    if (app.handles.mode === "translate") {
+    if (app.view.handles.mode === "translate") {
         const [px, py, pz] = position(pose);
-        const length = 0.01 * step * app.size;
+        const length = 0.01 * step * app.view.size;
         app.moveBody(body, placedAt(pose, [px + along.x * length, py + along.y * length, pz + along.z * length]));
         return;
     }
@@ -56,6 +57,10 @@ function nudge(app: App, event: KeyboardEvent, step: number): void {
     app.moveBody(body, placedAt(turned, [cx - tx, cy - ty, cz - tz]));
 }
 
+function toggleLocal({ view: { handles } }: App): void {
+    handles.isLocal = !handles.isLocal;
+}
+
 const KEYS: Key[] = [
     {
         name: "T",
@@ -69,7 +74,7 @@ const KEYS: Key[] = [
         is: plain("r"),
         run: (app) => app.setHandleMode("rotate"),
     },
-    { name: "L", does: "handles along the axes of A or of B", is: plain("l"), run: (app) => app.toggleLocal() },
+    { name: "L", does: "handles along the axes of A or of B", is: plain("l"), run: (app) => toggleLocal(app) },
     {
         name: "Alt + arrows, Page Up, Page Down",
         does: "move or turn B by a small step, with Shift by a large one",
@@ -82,14 +87,14 @@ const KEYS: Key[] = [
         is: (event) => isArrow(event) && !event.altKey && !event.ctrlKey,
         run: (app, event) => {
             const [x, y] = ARROWS[event.key] ?? [0, 0];
-            app.stage.turnBy(-0.12 * x, -0.1 * y);
+            app.view.stage.turnBy(-0.12 * x, -0.1 * y);
         },
     },
     {
         name: "+ and −",
         does: "zoom",
         is: (event) => "+=-".includes(event.key) && event.key.length === 1,
-        run: (app, event) => app.stage.turnBy(0, 0, event.key === "-" ? 1.15 : 1 / 1.15),
+        run: (app, event) => app.view.stage.turnBy(0, 0, event.key === "-" ? 1.15 : 1 / 1.15),
     },
     { name: "F", does: "fit everything into the view", is: plain("f"), run: (app) => app.fit() },
     {
@@ -99,11 +104,11 @@ const KEYS: Key[] = [
         run: (app, event) => app.lookAlong(Number(event.key) - 1),
     },
     { name: "U", does: "swap the axis that is up", is: plain("u"), run: (app) => app.swapUp() },
-    { name: "X", does: "see through the meshes", is: plain("x"), run: (app) => app.toggleXray() },
-    { name: "E", does: "edges of triangles", is: plain("e"), run: (app) => app.toggleEdges() },
-    { name: "S", does: "smooth or flat", is: plain("s"), run: (app) => app.toggleSmooth() },
-    { name: "G", does: "grid", is: plain("g"), run: (app) => app.toggleGrid() },
-    { name: "D", does: "dark or light", is: plain("d"), run: (app) => app.toggleTheme() },
+    { name: "X", does: "see through the meshes", is: plain("x"), run: (app) => app.look.toggleXray() },
+    { name: "E", does: "edges of triangles", is: plain("e"), run: (app) => app.look.toggleEdges() },
+    { name: "S", does: "smooth or flat", is: plain("s"), run: (app) => app.look.toggleSmooth() },
+    { name: "G", does: "grid", is: plain("g"), run: (app) => app.look.toggleGrid() },
+    { name: "D", does: "dark or light", is: plain("d"), run: (app) => app.look.toggleTheme() },
     { name: "Space", does: "play or pause the motion or the frames", is: plain(" "), run: (app) => app.togglePlay() },
     {
         name: "[ and ]",
@@ -115,15 +120,15 @@ const KEYS: Key[] = [
         name: "P",
         does: "ask about the triangle in the middle of the view",
         is: plain("p"),
-        run: (app) => app.pickMiddle(),
+        run: (app) => app.selection.pickMiddle(),
     },
     { name: "O", does: "open files", is: plain("o"), run: (app) => app.drop.choose() },
-    { name: "C", does: "copy the command line", is: plain("c"), run: (app) => app.copyCommand() },
+    { name: "C", does: "copy the command line", is: plain("c"), run: (app) => copyCommand(app) },
     {
         name: "Esc",
         does: "forget what is selected",
         is: (event) => event.key === "Escape",
-        run: (app) => app.unselect(),
+        run: (app) => app.selection.clear(),
     },
     { name: "?", does: "this list", is: (event) => event.key === "?", run: () => showKeys() },
 ];

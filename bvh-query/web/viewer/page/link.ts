@@ -2,11 +2,12 @@
 
 import { Vector3 } from "three";
 import type { App } from "./app.js";
+import { messageOf } from "./errors.js";
 import { words } from "./pose.js";
 
 /** Writes the present state. */
-export function stateOf(app: App): string {
-    const { camera, orbit } = app.stage;
+function stateOf(app: App): string {
+    const { camera, orbit } = app.view.stage;
     const parameters = new URLSearchParams();
     const numbers = (of: ArrayLike<number>) => Array.from(of, String).join(",");
     if (app.pair.isComplete) {
@@ -15,7 +16,7 @@ export function stateOf(app: App): string {
     const view = [...camera.position.toArray(), ...orbit.target.toArray()].map((value) => Number(value.toPrecision(7)));
     parameters.set("view", numbers(view));
     parameters.set("up", camera.up.y > 0.5 ? "y" : "z");
-    parameters.set("tab", app.panel.current);
+    parameters.set("tab", app.view.panel.current);
     const { draw, level, paint } = app.inside.state;
     if (draw !== "none" || paint !== "plain") {
         Object.entries({ draw, level, paint }).forEach(([name, value]) => {
@@ -26,20 +27,38 @@ export function stateOf(app: App): string {
     if (motion !== undefined) {
         parameters.set("motion", numbers(motion));
         parameters.set("clearance", String(app.motion.clearance));
+        if (app.motion.tolerance !== undefined) {
+            parameters.set("tolerance", String(app.motion.tolerance));
+        }
         parameters.set("time", String(app.motion.time));
     }
-    if (app.mode === "scene") {
+    if (app.view.mode === "scene") {
         parameters.set("frame", String(app.scene.frame));
     }
-    if (app.selection !== undefined) {
-        parameters.set("triangle", `${app.selection.body},${app.selection.triangle}`);
+    const { current } = app.selection;
+    if (current !== undefined) {
+        parameters.set("triangle", `${current.body},${current.triangle}`);
     }
     return parameters.toString().replaceAll("%2C", ",");
 }
 
-/** Goes to the state that the address names, if it names one. */
+/** Copies a link to the present state, and goes to it. */
+export function copyLink(app: App): void {
+    location.hash = stateOf(app);
+    void app.view.copy(location.href, "A link to this view");
+}
+
+/** Goes to the state that the address names, if it names one. What an address names wrongly is left out, and said. */
 export async function restore(app: App): Promise<void> {
-    const parameters = new URLSearchParams(location.hash.slice(1));
+    try {
+        await restoreFrom(app, new URLSearchParams(location.hash.slice(1)));
+    } catch (error) {
+        app.view.messages.say(`This link names something that cannot be shown: ${messageOf(error)}`, "error");
+    }
+}
+
+async function restoreFrom(app: App, parameters: URLSearchParams): Promise<void> {
+    const { panel, stage, mode } = app.view;
     const numbers = (name: string, count: number) => {
         const text = parameters.get(name);
         if (text === null || text === "") {
@@ -48,58 +67,77 @@ export async function restore(app: App): Promise<void> {
         const found = text.split(",").map(Number);
         return found.length === count && found.every(Number.isFinite) ? Float64Array.from(found) : undefined;
     };
+    const number = (name: string) => numbers(name, 1)?.[0];
     const up = parameters.get("up");
     if (up === "y" || up === "z") {
-        app.stage.setUp(up);
+        stage.setUp(up);
     }
-    const view = numbers("view", 6);
-    if (view !== undefined) {
-        app.stage.camera.position.copy(new Vector3().fromArray(view, 0));
-        app.stage.orbit.target.copy(new Vector3().fromArray(view, 3));
-        app.stage.orbit.update();
+    const camera = numbers("view", 6);
+    // In units of the stage, in which everything has a size of about 1.
+    if (camera?.every((value) => Math.abs(value) < 1e6)) {
+        stage.camera.position.copy(new Vector3().fromArray(camera, 0));
+        stage.orbit.target.copy(new Vector3().fromArray(camera, 3));
+        stage.orbit.update();
     }
-    const [motion, time] = [numbers("motion", 24), numbers("time", 1)];
-    if (motion !== undefined && app.pair.isComplete) {
-        await app.motion.set(motion, numbers("clearance", 1)?.[0]);
-        await app.motion.go(time?.[0] ?? 0);
+    const [motion, pose, frame] = [numbers("motion", 24), numbers("pose", 12), number("frame")];
+    if (app.pair.isComplete) {
+        if (motion !== undefined) {
+            await app.motion.set(motion, number("clearance"), number("tolerance"));
+            await app.motion.go(number("time") ?? 0);
+        }
+        if (pose !== undefined) {
+            await app.pair.setPose(pose);
+        }
     }
-    const pose = numbers("pose", 12);
-    if (pose !== undefined && app.pair.isComplete) {
-        await app.pair.setPose(pose);
-    }
-    const frame = numbers("frame", 1)?.[0];
-    if (frame !== undefined && app.mode === "scene") {
+    if (frame !== undefined && mode === "scene") {
         await app.scene.go(frame);
     }
     const text = (name: string) => parameters.get(name) ?? undefined;
     app.inside.restore({ draw: text("draw"), level: text("level"), paint: text("paint") });
-    const tab = text("tab");
-    if (tab !== undefined) {
-        app.panel.show(tab);
-    }
+    panel.show(text("tab") ?? "");
     const triangle = numbers("triangle", 2);
     if (triangle !== undefined) {
-        await app.select(triangle[0] ?? 0, triangle[1] ?? 0);
+        await app.selection.select(triangle[0] ?? 0, triangle[1] ?? 0);
     }
 }
 
-/** The command line that asks the same. */
-export function command(app: App): string {
-    const quote = (word: string) => (/^[\w./+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
+/** Copies the command line that asks the same, or says why there is none. */
+export function copyCommand(app: App): void {
+    const line = commandOf(app);
+    if (line === undefined) {
+        app.view.messages.say("No command asks about two objects with different names.");
+    } else {
+        void app.view.copy(line, "The command");
+    }
+}
+
+/** The command line that asks the same; `undefined` if there is none. */
+export function commandOf(app: App): string | undefined {
+    const { mode, panel } = app.view;
     const { a, b } = app.pair;
-    if (app.mode === "scene" || a === undefined) {
-        return app.mode === "scene" ? "cbvh scene SCENE FRAMES --mode pairs --list" : "cbvh view";
+    if (mode === "scene" || a === undefined) {
+        return mode === "scene" ? "cbvh scene SCENE FRAMES --mode pairs --list" : "cbvh view";
     }
-    const path = (file: number) => quote(app.pathOf(file));
+    const [[pathA = "", objectA], [pathB = "", objectB]] = [app.wordsOf(a), b === undefined ? [] : app.wordsOf(b)];
     if (b === undefined) {
-        return `cbvh dump ${path(a.file)}`;
+        return `cbvh dump ${quoted(pathA)}`;
     }
-    const { motion } = app.motion;
-    if (app.panel.current === "motion" && motion !== undefined) {
-        const clearance = app.motion.clearance > 0 ? ` --clearance ${app.motion.clearance}` : "";
-        return `echo "${words(motion)}" | cbvh motion ${path(a.file)} ${path(b.file)} /dev/stdin${clearance}`;
+    if (objectA !== undefined && objectB !== undefined && objectA !== objectB) {
+        return undefined;
+    }
+    const object = objectA ?? objectB;
+    const files = `${quoted(pathA)} ${quoted(pathB)}`;
+    const end = object === undefined ? "" : ` --object ${quoted(object)}`;
+    const { motion, clearance, tolerance } = app.motion;
+    if (panel.current === "motion" && motion !== undefined) {
+        const within = clearance > 0 ? ` --clearance ${clearance}` : "";
+        const unsure = tolerance === undefined ? "" : ` --tolerance ${tolerance}`;
+        return `echo "${words(motion)}" | cbvh motion ${files} /dev/stdin${within}${unsure}${end}`;
     }
     const touches = app.pair.near?.distance.distance === 0;
-    const mode = touches ? "contacts" : "distance";
-    return `cbvh query ${path(a.file)} ${path(b.file)} --mode ${mode} --pose "${words(app.pair.pose)}"`;
+    const asks = touches ? "contacts" : "distance";
+    return `cbvh query ${files} --mode ${asks} --pose "${words(app.pair.pose)}"${end}`;
 }
+
+/** A word for a shell. */
+const quoted = (word: string): string => (/^[\w./+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);

@@ -2,6 +2,7 @@
 
 import { App } from "./app.js";
 import { Asker } from "./asker.js";
+import { addButtons } from "./buttons.js";
 import { readContent } from "./content.js";
 import { describe, failPage, messageOf } from "./errors.js";
 import { listen } from "./keys.js";
@@ -36,7 +37,11 @@ async function start(): Promise<void> {
             throw new Error("expected the element #app in this page, found none");
         }
         const app = new App(asker, host);
+        addButtons(app);
         listen(app);
+        const prefersDark = window.matchMedia("(prefers-color-scheme: dark)");
+        app.look.setDark(prefersDark.matches);
+        prefersDark.addEventListener("change", () => app.look.setDark(prefersDark.matches));
         await started;
         performance.mark("module started");
         if (filled === undefined) {
@@ -48,7 +53,7 @@ async function start(): Promise<void> {
             });
             await restore(app);
         }
-        app.stage.drawNow();
+        app.view.stage.drawNow();
         document.getElementById("loading")?.remove();
         root.dataset.state = "ready";
         performance.mark("drawn");

@@ -1,14 +1,16 @@
 /** Motions of B: where they are certainly free, the first hit, and a slider that plays them. */
 
 import { Mesh, type Object3D } from "three";
-import type { MotionAnswer } from "../../ts/answers.js";
-import type { App } from "./app.js";
+import { type MotionAnswer, MotionKind } from "../../ts/answers.js";
 import { type Body, material } from "./bodies.js";
-import { exact, fact, fill, h, iconButton, milliseconds, pointOf } from "./dom.js";
+import { exact, fact, fill, h, milliseconds, pointOf } from "./dom.js";
 import { messageOf } from "./errors.js";
 import { Overlay } from "./overlays.js";
+import type { Pair } from "./pair.js";
 import { part } from "./panel.js";
-import { move, numbersOf, words } from "./pose.js";
+import { Player } from "./player.js";
+import { move, numbersOf } from "./pose.js";
+import type { View } from "./view.js";
 
 /** How long a motion plays, in milliseconds. */
 const DURATION = 4000;
@@ -16,19 +18,14 @@ const DURATION = 4000;
 const PATH_POINTS = 96;
 
 export class MotionView {
-    readonly #page: HTMLElement;
     readonly #overlay: Overlay;
     readonly #answerBox = h("div", { class: "answer" });
-    readonly #slider = h("input", {
-        type: "range",
-        min: "0",
-        max: "1",
-        step: "any",
-        value: "0",
-        class: "timeline",
-        "aria-label": "Time of the motion",
-    });
-    readonly #time = h("output", { class: "number time" }, "t = 0");
+    readonly #player = new Player(
+        "Time of the motion",
+        "any",
+        (time) => this.go(time),
+        () => this.#begin(),
+    );
     readonly #rows = h("textarea", {
         class: "code",
         rows: "6",
@@ -43,16 +40,17 @@ export class MotionView {
         class: "field",
         "aria-label": "Clearance",
     });
-    readonly #play = iconButton("play", "Play or pause (Space)", () => this.toggle());
     #motion: Float64Array | undefined;
     #tolerance: number | undefined;
     #ghosts: Object3D[] = [];
-    #playing = 0;
 
-    constructor(readonly app: App) {
-        this.#overlay = new Overlay(app.stage, 10);
+    constructor(
+        readonly view: View,
+        readonly pair: Pair,
+    ) {
+        this.#overlay = new Overlay(view.stage, 10);
         this.#overlay.isVisible = false;
-        this.#page = app.panel.add("motion", "Motion", (shown) => {
+        const page = view.panel.add("motion", "Motion", (shown) => {
             this.#overlay.isVisible = shown;
             for (const ghost of this.#ghosts) {
                 ghost.visible = shown;
@@ -61,17 +59,16 @@ export class MotionView {
                 this.stop();
             }
         });
-        this.#slider.addEventListener("input", () => void this.go(this.#slider.valueAsNumber));
         this.#rows.addEventListener("change", () => this.#read());
         this.#clearance.addEventListener("change", () => void this.#ask());
         const set = (end: 0 | 1) => () => {
-            const motion = this.#motion?.slice() ?? Float64Array.of(...app.pair.pose, ...app.pair.pose);
-            motion.set(app.pair.pose, 12 * end);
+            const motion = this.#motion?.slice() ?? Float64Array.of(...pair.pose, ...pair.pose);
+            motion.set(pair.pose, 12 * end);
             void this.set(motion);
         };
-        this.#page.append(
+        page.append(
             this.#answerBox,
-            h("div", { class: "player" }, this.#play, this.#slider, this.#time),
+            this.#player.element,
             part(
                 "Ends",
                 h(
@@ -94,7 +91,7 @@ export class MotionView {
     }
 
     #showNothing(): void {
-        this.#slider.classList.add("plain");
+        this.#player.slider.classList.add("plain");
         fill(this.#answerBox, h("p", { class: "muted" }, "No motion yet. Set its start and its end below."));
     }
 
@@ -111,7 +108,7 @@ export class MotionView {
     }
 
     get time(): number {
-        return this.#slider.valueAsNumber;
+        return this.#player.value;
     }
 
     clear(): void {
@@ -135,24 +132,31 @@ export class MotionView {
     }
 
     async #ask(): Promise<void> {
-        const { a, b } = this.app.pair;
+        const { a, b } = this.pair;
         const motion = this.#motion;
         if (a === undefined || b === undefined || motion === undefined) {
             return;
         }
         try {
-            const answer = await this.app.asker.ask("motion", a.side, b.side, motion, this.clearance, this.#tolerance);
+            const answer = await this.view.asker.ask("motion", a.side, b.side, motion, this.clearance, this.#tolerance);
             this.#showAnswer(answer, answer.took);
             await this.#drawPath(b, motion, answer);
             await this.go(this.time);
         } catch (error) {
+            // What was known of another motion is no answer.
+            this.stop();
+            this.#motion = undefined;
+            this.#overlay.clear();
+            this.#removeGhosts();
+            this.#showNothing();
             fill(this.#answerBox, h("p", { class: "problem" }, messageOf(error)));
         }
     }
 
     #showAnswer(answer: MotionAnswer, took: number): void {
         const { kind, freeUntil, at, nearest } = answer;
-        const clearance = this.clearance;
+        const { clearance } = this;
+        const isHit = kind === MotionKind.HIT;
         const within = clearance > 0 ? ` by more than ${clearance}` : "";
         const name = ["Free", "Hit", "Near"][kind] ?? "";
         const says = [
@@ -168,27 +172,32 @@ export class MotionView {
                 "dl",
                 { class: "facts" },
                 fact("certainly free", "until t = ", exact(freeUntil)),
-                kind !== 0 && fact("first hit", "t = ", exact(at)),
+                kind !== 0 && fact(isHit ? "first hit" : "near", "t = ", exact(at)),
                 nearest !== undefined && fact("point on A", pointOf(nearest.pointA)),
                 nearest !== undefined && fact("triangles", `${nearest.triangleA} of A, ${nearest.triangleB} of B`),
                 fact("answered in", milliseconds(took)),
             ),
             kind !== 0 &&
-                h("button", { type: "button", class: "button", click: () => void this.go(at) }, "Go to the first hit"),
+                h(
+                    "button",
+                    { type: "button", class: "button", click: () => void this.go(at) },
+                    isHit ? "Go to the first hit" : "Go to this moment",
+                ),
         );
         const percent = (share: number) => `${(100 * share).toFixed(3)}%`;
-        const style = this.#slider.style;
+        const { slider } = this.#player;
+        const { style } = slider;
         style.setProperty("--free", percent(freeUntil));
         style.setProperty("--hit", percent(kind === 0 ? 1 : at));
-        this.#slider.classList.remove("plain");
+        slider.classList.remove("plain");
     }
 
     async #drawPath(b: Body, motion: Float64Array, answer: MotionAnswer): Promise<void> {
         const times = Float64Array.from({ length: PATH_POINTS + 1 }, (_, k) => k / PATH_POINTS);
         const ends = answer.kind === 0 ? [0, 1] : [0, 1, answer.at];
-        const poses = await this.app.asker.ask("motionPoses", motion, Float64Array.of(...times, ...ends));
+        const poses = await this.view.asker.ask("motionPoses", motion, Float64Array.of(...times, ...ends));
         const centre = (k: number) => move(poses.subarray(12 * k, 12 * k + 12), b.shown.centre);
-        const { palette } = this.app.stage;
+        const { palette } = this.view.stage;
         this.#overlay.clear();
         const [free, rest]: [number[], number[]] = [[], []];
         for (let k = 0; k < PATH_POINTS; k++) {
@@ -199,8 +208,9 @@ export class MotionView {
         this.#overlay.segments(rest, palette.still, 2, { dashed: true });
         const { nearest } = answer;
         if (nearest !== undefined) {
-            this.#overlay.dots(nearest.pointA, palette.hit, 14);
-            this.#overlay.label("first hit", nearest.pointA, "hit");
+            const isHit = answer.kind === MotionKind.HIT;
+            this.#overlay.dots(nearest.pointA, isHit ? palette.hit : palette.near, 14);
+            this.#overlay.label(isHit ? "first hit" : "near", nearest.pointA, isHit ? "hit" : "near");
         }
         this.#removeGhosts();
         if (b.shown.triangles > 300_000) {
@@ -215,9 +225,9 @@ export class MotionView {
             ghost.material.flatShading = b.mesh.material.flatShading;
             ghost.renderOrder = 2;
             const at = PATH_POINTS + 1 + k;
-            this.app.stage.place(ghost, poses.slice(12 * at, 12 * at + 12), b.shown.centre);
-            ghost.visible = this.app.panel.current === "motion";
-            this.app.stage.scene.add(ghost);
+            this.view.stage.place(ghost, poses.slice(12 * at, 12 * at + 12), b.shown.centre);
+            ghost.visible = this.view.panel.current === "motion";
+            this.view.stage.scene.add(ghost);
             this.#ghosts.push(ghost);
         });
     }
@@ -226,51 +236,38 @@ export class MotionView {
         for (const ghost of this.#ghosts.splice(0)) {
             ghost.removeFromParent();
         }
-        this.app.stage.draw();
+        this.view.stage.draw();
     }
 
-    /** Moves B to a time. */
-    async go(time: number): Promise<void> {
+    /** Moves B to a time from 0 to 1. */
+    async go(to: number): Promise<void> {
         const motion = this.#motion;
         if (motion === undefined) {
             return;
         }
-        this.#slider.value = String(time);
-        this.#time.textContent = `t = ${time.toFixed(4)}`;
-        const pose = await this.app.asker.ask("motionPoses", motion, Float64Array.of(time));
-        await this.app.pair.setPose(pose);
+        const time = this.#player.nearest(to);
+        this.#player.show(time, `t = ${time.toFixed(4)}`);
+        await this.pair.setPose(await this.view.asker.ask("motionPoses", motion, Float64Array.of(time)));
     }
 
     toggle(): void {
-        if (this.#playing !== 0) {
-            this.stop();
-            return;
-        }
-        if (this.#motion === undefined) {
-            return;
-        }
-        const from = this.time >= 1 ? 0 : this.time;
-        const began = performance.now() - from * DURATION;
-        fill(this.#play, ...iconButton("pause", "", () => {}).childNodes);
-        const step = async () => {
-            const time = Math.min((performance.now() - began) / DURATION, 1);
-            await this.go(time);
-            if (this.#playing === 0) {
-                return;
-            }
-            if (time >= 1) {
-                this.stop();
-            } else {
-                this.#playing = requestAnimationFrame(() => void step());
-            }
-        };
-        this.#playing = requestAnimationFrame(() => void step());
+        this.#player.toggle();
     }
 
     stop(): void {
-        cancelAnimationFrame(this.#playing);
-        this.#playing = 0;
-        fill(this.#play, ...iconButton("play", "", () => {}).childNodes);
+        this.#player.stop();
+    }
+
+    #begin(): (() => number | undefined) | undefined {
+        if (this.#motion === undefined) {
+            return undefined;
+        }
+        const from = this.time >= 1 ? 0 : this.time;
+        const began = performance.now() - from * DURATION;
+        return () => {
+            const time = (performance.now() - began) / DURATION;
+            return time < 1 || this.time < 1 ? Math.min(time, 1) : undefined;
+        };
     }
 
     #read(): void {
@@ -278,12 +275,8 @@ export class MotionView {
         if (numbers.length === 24 && numbers.every(Number.isFinite)) {
             void this.set(Float64Array.from(numbers));
         } else {
-            this.app.messages.say(`A motion has 24 numbers, found ${numbers.length}.`);
+            const found = numbers.length === 24 ? "one that is not finite" : String(numbers.length);
+            this.view.messages.say(`A motion has 24 finite numbers, found ${found}.`);
         }
-    }
-
-    /** What asks the same on the command line. */
-    get words(): string {
-        return this.#motion === undefined ? "" : words(this.#motion);
     }
 }

@@ -1,7 +1,6 @@
 /** Two meshes: moves B, asks about each pose, and shows the answers on the stage and as numbers. */
 
 import type { DeepAnswer, NearAnswer } from "../worker/pairs.js";
-import type { App } from "./app.js";
 import { Latest } from "./asker.js";
 import type { Body } from "./bodies.js";
 import { countOf, exact, fact, fill, h, milliseconds, pointOf, short } from "./dom.js";
@@ -9,8 +8,12 @@ import { messageOf } from "./errors.js";
 import { Overlay } from "./overlays.js";
 import { part } from "./panel.js";
 import { axisAngle, fromAxisAngle, identity, numbersOf, type Pose, placedAt, position, words } from "./pose.js";
+import type { View } from "./view.js";
 
-const RELATIONS = ["Touching", "Apart", "A is inside B", "B is inside A", "Partly inside", "Apart"] as const;
+/** By the number of the relation. Of a mesh that is not closed nobody knows what is inside, but surfaces are apart or not. */
+const RELATIONS = ["Touching", "Apart", "A is inside B", "B is inside A", "Partly inside", "Surfaces apart"] as const;
+const APART = 1;
+const UNDEFINED = 5;
 /** More normals than this are not drawn: those of the largest patches are. */
 const MAX_ARROWS = 24;
 /** How long the pose stays before what takes longer is asked, in milliseconds. */
@@ -25,7 +28,6 @@ export class Pair {
     readonly #overlay: Overlay;
     readonly #deepOverlay: Overlay;
     readonly #latest = new Latest();
-    readonly #page: HTMLElement;
     readonly #answer = h("div", { class: "answer", "aria-live": "polite" });
     readonly #depth = h("div");
     readonly #speed = h("div", { class: "row" });
@@ -39,20 +41,20 @@ export class Pair {
     #timer = 0;
     #asked = 0;
     near: NearAnswer | undefined;
-    deep: DeepAnswer | undefined;
     /** Called after each answer. */
     readonly onAnswer: ((answer: NearAnswer) => void)[] = [];
 
-    constructor(readonly app: App) {
-        this.#overlay = new Overlay(app.stage, 20);
-        this.#deepOverlay = new Overlay(app.stage, 30);
-        this.#page = app.panel.add("pair", "Pair");
-        this.#page.append(
-            this.#answer,
-            part("Depth and contact", this.#depth),
-            part("Place of B in the frame of A", this.#poseFields()),
-            part("Speed", this.#speed),
-        );
+    constructor(readonly view: View) {
+        this.#overlay = new Overlay(view.stage, 20);
+        this.#deepOverlay = new Overlay(view.stage, 30);
+        view.panel
+            .add("pair", "Pair")
+            .append(
+                this.#answer,
+                part("Depth and contact", this.#depth),
+                part("Place of B in the frame of A", this.#poseFields()),
+                part("Speed", this.#speed),
+            );
         const measure = h("button", { type: "button", class: "button", click: () => void this.#measure() }, "Measure");
         fill(this.#speed, measure, h("span", { class: "muted" }, "questions per second in this page"));
     }
@@ -73,7 +75,7 @@ export class Pair {
     async set(a: Body | undefined, b: Body | undefined, pose: Pose): Promise<void> {
         this.#a = a;
         this.#b = b;
-        this.app.handles.attach(b);
+        this.view.handles.attach(b);
         this.clear();
         if (b !== undefined) {
             await this.setPose(pose);
@@ -83,16 +85,11 @@ export class Pair {
     clear(): void {
         clearTimeout(this.#timer);
         this.#asked++;
-        this.near = this.deep = undefined;
+        this.near = undefined;
         this.#overlay.clear();
         this.#deepOverlay.clear();
         fill(this.#answer);
         fill(this.#depth);
-    }
-
-    set isVisible(visible: boolean) {
-        this.#overlay.isVisible = visible;
-        this.#deepOverlay.isVisible = visible;
     }
 
     /** Moves B, and asks. The answer has been shown when the promise is done. */
@@ -103,7 +100,7 @@ export class Pair {
         }
         this.pose = pose;
         b.setPose(pose);
-        this.app.handles.follow();
+        this.view.handles.follow();
         this.#showPose();
         return this.refresh();
     }
@@ -126,11 +123,10 @@ export class Pair {
             return;
         }
         try {
-            const near = await this.app.asker.ask("near", a.side, b.side, pose, this.within);
+            const near = await this.view.asker.ask("near", a.side, b.side, pose, this.within);
             this.near = near;
-            this.deep = undefined;
             this.#showNear(near);
-            this.app.setAnswer({
+            this.view.setAnswer({
                 distance: near.distance.distance,
                 lower: near.distance.lower,
                 upper: near.distance.upper,
@@ -143,7 +139,13 @@ export class Pair {
                 told(near);
             }
         } catch (error) {
+            // What was known of another pose is no answer.
+            this.near = undefined;
+            this.#overlay.clear();
+            this.#deepOverlay.clear();
             fill(this.#answer, h("p", { class: "problem" }, messageOf(error)));
+            fill(this.#depth);
+            this.view.setAnswer({ distance: null, error: messageOf(error), pose: [...pose] });
         }
     }
 
@@ -152,13 +154,12 @@ export class Pair {
         if (a === undefined || b === undefined || near === undefined || number !== this.#asked) {
             return;
         }
-        if (near.distance.distance > 0 && (near.relation === undefined || near.relation === 1 || near.relation === 5)) {
+        if (isApart(near)) {
             return;
         }
         try {
-            const deep = await this.app.asker.ask("deep", a.side, b.side, this.pose);
+            const deep = await this.view.asker.ask("deep", a.side, b.side, this.pose);
             if (number === this.#asked) {
-                this.deep = deep;
                 this.#showDeep(deep);
             }
         } catch (error) {
@@ -172,7 +173,7 @@ export class Pair {
             return;
         }
         const { distance } = near;
-        const { palette } = this.app.stage;
+        const { palette } = this.view.stage;
         this.#overlay.clear();
         this.#deepOverlay.clear();
         if (near.contacts > 0) {
@@ -188,12 +189,8 @@ export class Pair {
             }
         }
         const touches = near.contacts > 0 || distance.distance === 0;
-        const name = near.relation === undefined ? (touches ? "Touching" : "Apart") : (RELATIONS[near.relation] ?? "");
-        const kind = touches
-            ? "hit"
-            : near.relation === 1 || near.relation === 5 || near.relation === undefined
-              ? "free"
-              : "in";
+        const name = RELATIONS[near.relation ?? (touches ? 0 : UNDEFINED)] ?? "";
+        const kind = touches ? "hit" : isApart(near) ? "free" : "in";
         const summary = (body: Body, object: number, triangle: number) => {
             const { objects } = body.shown.summary;
             const of = objects.length > 1 ? ` of ${objects[object] || `object ${object}`}` : "";
@@ -226,22 +223,21 @@ export class Pair {
                 fact("point on B", pointOf(distance.pointB)),
                 fact("triangle of A", summary(a, distance.objectA, distance.triangleA)),
                 fact("triangle of B", summary(b, distance.objectB, distance.triangleB)),
-                near.relation === 5 && fact("inside", "unknown, because a mesh is not closed"),
+                near.relation === UNDEFINED && fact("inside", "unknown, because a mesh is not closed"),
                 near.relation === undefined && fact("inside", "unknown, because a file does not state what is closed"),
                 fact("answered in", `${milliseconds(near.distanceTook)} (distance), ${milliseconds(near.took)} (all)`),
             ),
         );
-        const isApart = !touches && kind === "free";
-        fill(this.#depth, h("p", { class: "muted" }, isApart ? "The meshes are apart." : "…"));
+        fill(this.#depth, h("p", { class: "muted" }, isApart(near) ? `${name}.` : "…"));
     }
 
     #showDeep(deep: DeepAnswer): void {
-        const { palette } = this.app.stage;
+        const { palette } = this.view.stage;
         const { near } = this;
         const { depth } = deep;
         this.#deepOverlay.clear();
         this.#deepOverlay.segments(deep.curves, palette.hit, 2.5, { faint: 0.55 });
-        const size = this.app.size;
+        const size = this.view.size;
         for (let k = 0; k < Math.min(deep.centres.length, 3 * MAX_ARROWS); k += 3) {
             const normal = deep.normals.subarray(k, k + 3);
             const length = 0.05 * size;
@@ -310,7 +306,7 @@ export class Pair {
         );
         const copy = h(
             "button",
-            { type: "button", class: "button", click: () => void this.app.copy(words(this.pose), "The pose") },
+            { type: "button", class: "button", click: () => void this.view.copy(words(this.pose), "The pose") },
             "Copy",
         );
         return h(
@@ -366,7 +362,8 @@ export class Pair {
             void this.setPose(Float64Array.from(numbers));
         } else {
             this.#rows.classList.add("wrong");
-            this.app.messages.say(`A pose has 12 numbers, found ${numbers.length}.`, "note");
+            const found = numbers.length === 12 ? "one that is not finite" : String(numbers.length);
+            this.view.messages.say(`A pose has 12 finite numbers, found ${found}.`);
         }
     }
 
@@ -375,8 +372,7 @@ export class Pair {
         if (a === undefined || b === undefined) {
             return;
         }
-        const { distance, collide } = await this.app.asker.ask("speed", a.side, b.side, this.pose);
-        this.app.measured = { distance, collide };
+        const { distance, collide } = await this.view.asker.ask("speed", a.side, b.side, this.pose);
         const text = `${countOf(Math.round(distance))} distances, ${countOf(Math.round(collide))} contact tests per second`;
         fill(this.#speed, this.#speed.firstChild ?? undefined, h("span", {}, text));
     }
@@ -385,3 +381,7 @@ export class Pair {
 /** The first of some points, or another one if there are none. */
 const firstOf = (points: Float64Array, other: Float64Array): Float64Array =>
     points.length >= 3 ? points.slice(0, 3) : other;
+
+/** Whether nothing touches, and nothing is known to be inside. */
+const isApart = ({ distance, relation = UNDEFINED }: NearAnswer): boolean =>
+    distance.distance > 0 && (relation === APART || relation === UNDEFINED);

@@ -1,11 +1,12 @@
 /** Points and rays: typed, asked of one mesh, and shown on the stage and as numbers. */
 
-import type { App } from "./app.js";
 import type { Body } from "./bodies.js";
 import { exact, fill, h, pointOf } from "./dom.js";
 import { messageOf } from "./errors.js";
 import { Overlay } from "./overlays.js";
+import type { Pair } from "./pair.js";
 import { part } from "./panel.js";
+import type { View } from "./view.js";
 
 const SIDES = new Map([
     [1, "inside"],
@@ -53,10 +54,13 @@ export class Probes {
     readonly #rayAnswers = h("div");
     #asked = 0;
 
-    constructor(readonly app: App) {
-        this.#overlay = new Overlay(app.stage, 40);
+    constructor(
+        readonly view: View,
+        pair: Pair,
+    ) {
+        this.#overlay = new Overlay(view.stage, 40);
         this.#overlay.isVisible = false;
-        this.#page = app.panel.add("probes", "Probes", (shown) => {
+        this.#page = view.panel.add("probes", "Probes", (shown) => {
             this.#overlay.isVisible = shown;
             if (shown) {
                 void this.ask();
@@ -65,8 +69,8 @@ export class Probes {
         for (const input of [this.#points, this.#rays, this.#body]) {
             input.addEventListener("input", () => void this.ask());
         }
-        app.pair.onAnswer.push(() => {
-            if (app.panel.current === "probes") {
+        pair.onAnswer.push(() => {
+            if (view.panel.current === "probes") {
                 void this.ask();
             }
         });
@@ -80,14 +84,14 @@ export class Probes {
     }
 
     offer(): void {
-        fill(this.#body, ...this.app.bodies.map((body, k) => h("option", { value: String(k) }, body.name)));
+        fill(this.#body, ...this.view.bodies.map((body, k) => h("option", { value: String(k) }, body.name)));
         this.#overlay.clear();
         fill(this.#pointAnswers);
         fill(this.#rayAnswers);
     }
 
     get #chosen(): Body | undefined {
-        return this.app.bodies[Number(this.#body.value)];
+        return this.view.bodies[Number(this.#body.value)];
     }
 
     #example(): void {
@@ -108,11 +112,11 @@ export class Probes {
             return;
         }
         this.#overlay.clear();
-        const { palette } = this.app.stage;
-        const size = this.app.size;
+        const { palette } = this.view.stage;
+        const size = this.view.size;
         try {
             const points = linesOf(this.#points.value, 3, "point");
-            const { closest, sides } = await this.app.asker.ask("points", body.file, points, body.pose);
+            const { closest, sides } = await this.view.asker.ask("points", body.file, points, body.pose);
             if (number !== this.#asked) {
                 return;
             }
@@ -147,7 +151,7 @@ export class Probes {
             const half = (start: number) =>
                 Float64Array.from({ length: 3 * count }, (_, k) => rays[6 * Math.floor(k / 3) + start + (k % 3)] ?? 0);
             const [origins, directions] = [half(0), half(3)];
-            const hits = await this.app.asker.ask("rays", body.file, origins, directions, body.pose);
+            const hits = await this.view.asker.ask("rays", body.file, origins, directions, body.pose);
             if (number !== this.#asked) {
                 return;
             }

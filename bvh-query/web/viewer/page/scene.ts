@@ -1,15 +1,17 @@
 /** Scenes: frames of moving instances with a slider, the pairs that touch, and the nearest pair. Clash reports: a list. */
 
 import type { FrameAnswer } from "../worker/scenes.js";
-import type { App } from "./app.js";
 import { Latest } from "./asker.js";
 import type { Body } from "./bodies.js";
 import type { Content, ContentClash, ContentInstance } from "./content.js";
-import { countOf, exact, fact, fill, h, iconButton, milliseconds, pointOf, short } from "./dom.js";
+import { countOf, exact, fact, fill, h, milliseconds, pointOf, short } from "./dom.js";
 import { messageOf } from "./errors.js";
+import type { Look, Tint } from "./look.js";
 import { Overlay } from "./overlays.js";
 import { part } from "./panel.js";
+import { Player } from "./player.js";
 import { move, type Pose } from "./pose.js";
+import type { View } from "./view.js";
 
 type SceneShow = Extract<Content["show"], { kind: "scene" | "clash" }>;
 
@@ -17,25 +19,21 @@ type SceneShow = Extract<Content["show"], { kind: "scene" | "clash" }>;
 const RATE = 24;
 /** More pairs than this are not listed. */
 const MAX_LISTED = 400;
+/** More clashes than this are not listed. */
+const MAX_LISTED_CLASHES = 2000;
 
-export class SceneView {
+export class SceneView implements Tint {
     readonly #overlay: Overlay;
     readonly #pairOverlay: Overlay;
     readonly #frameBox = h("div", { class: "answer" });
     readonly #list = h("div", { class: "list", role: "listbox", "aria-label": "Pairs that touch" });
     readonly #clashBox = h("div");
-    readonly #slider = h("input", {
-        type: "range",
-        min: "0",
-        max: "0",
-        step: "1",
-        value: "0",
-        class: "timeline plain",
-        "aria-label": "Frame",
-    });
-    readonly #number = h("output", { class: "number time" });
-    readonly #play = iconButton("play", "Play or pause (Space)", () => this.toggle());
-    readonly #player = h("div", { class: "player" }, this.#play, this.#slider, this.#number);
+    readonly #player = new Player(
+        "Frame",
+        "1",
+        (frame) => this.go(frame),
+        () => this.#begin(),
+    );
     readonly #filter = h("select", { class: "field", "aria-label": "Class of clashes" });
     readonly #latest = new Latest();
     #instances: ContentInstance[] = [];
@@ -44,24 +42,25 @@ export class SceneView {
     #moving: number[] = [];
     #touching = new Set<number>();
     #chosen: [number, number] | undefined;
-    #timer = 0;
 
-    constructor(readonly app: App) {
-        this.#overlay = new Overlay(app.stage, 20);
-        this.#pairOverlay = new Overlay(app.stage, 30);
-        const scene = app.panel.add("scene", "Scene");
-        scene.append(this.#frameBox, this.#player, part("Pairs that touch", this.#list));
-        const clash = app.panel.add("clash", "Clashes");
+    constructor(
+        readonly view: View,
+        readonly look: Look,
+    ) {
+        this.#overlay = new Overlay(view.stage, 20);
+        this.#pairOverlay = new Overlay(view.stage, 30);
+        const scene = view.panel.add("scene", "Scene");
+        scene.append(this.#frameBox, this.#player.element, part("Pairs that touch", this.#list));
+        const clash = view.panel.add("clash", "Clashes");
         clash.append(
             h("div", { class: "fields" }, h("span", { class: "fields-title" }, "show"), this.#filter),
             this.#clashBox,
         );
-        this.#slider.addEventListener("input", () => void this.go(this.#slider.valueAsNumber));
         this.#filter.addEventListener("change", () => this.#listClashes());
     }
 
     get frame(): number {
-        return this.#slider.valueAsNumber;
+        return this.#player.value;
     }
 
     clear(): void {
@@ -73,14 +72,16 @@ export class SceneView {
         this.#frames = [];
         this.#touching.clear();
         this.#chosen = undefined;
+        this.look.tint = undefined;
     }
 
     async set(show: SceneShow): Promise<void> {
         this.clear();
-        const { app } = this;
+        const { view } = this;
+        this.look.tint = this;
         this.#instances = show.instances;
         this.#moving = show.instances.flatMap((instance, k) => (instance.moving ? [k] : []));
-        await app.asker.ask(
+        await view.asker.ask(
             "makeScene",
             show.instances.map((instance) => ({ ...instance, pose: Float64Array.from(instance.pose) })),
             show.kind === "scene" ? show.allowed : [],
@@ -88,8 +89,8 @@ export class SceneView {
         );
         if (show.kind === "scene") {
             this.#frames = show.frames;
-            this.#slider.max = String(Math.max(this.#frames.length - 1, 0));
-            this.#player.hidden = this.#frames.length < 2;
+            this.#player.slider.max = String(Math.max(this.#frames.length - 1, 0));
+            this.#player.element.hidden = this.#frames.length < 2;
             await this.go(0);
         } else {
             this.#clashes = show.clashes;
@@ -103,10 +104,9 @@ export class SceneView {
                 }),
             );
             this.#listClashes();
-            app.setAnswer({
-                distance: show.clashes.reduce((least, clash) => Math.min(least, clash.distance ?? 0), Number.MAX_VALUE),
-                clashes: show.clashes.length,
-            });
+            this.look.apply();
+            // The report is the command's. The page answers once a clash is chosen.
+            view.setAnswer({ distance: null, clashes: show.clashes.length });
         }
     }
 
@@ -114,41 +114,47 @@ export class SceneView {
         return this.#instances[instance]?.name || `instance ${instance}`;
     }
 
-    /** Shows a frame. */
-    go(frame: number): Promise<void> {
+    /** Shows a frame, counted from 0. */
+    go(to: number): Promise<void> {
         if (this.#chosen !== undefined) {
             this.release();
         }
-        this.#slider.value = String(frame);
-        this.#number.textContent = `${frame + 1} / ${this.#frames.length}`;
+        const frame = this.#player.nearest(to);
+        this.#player.show(frame, `${frame + 1} / ${this.#frames.length}`);
         const numbers = this.#frames[frame] ?? [];
         this.#moving.forEach((instance, k) => {
             const pose = Float64Array.from(numbers.slice(12 * k, 12 * k + 12));
             if (pose.length === 12) {
-                this.app.bodies[instance]?.setPose(pose);
+                this.view.bodies[instance]?.setPose(pose);
             }
         });
-        this.app.handles.follow();
+        this.view.handles.follow();
         return this.refresh();
     }
 
     /** Asks about the poses of all instances again. */
     refresh(): Promise<void> {
-        const { app } = this;
+        const { view } = this;
         return this.#latest.run(async () => {
-            const movable = Uint32Array.from(app.bodies, (_, k) => k);
-            const poses = Float64Array.from(app.bodies.flatMap((body) => [...body.pose]));
+            const movable = Uint32Array.from(view.bodies, (_, k) => k);
+            const poses = Float64Array.from(view.bodies.flatMap((body) => [...body.pose]));
             try {
-                this.#showFrame(await app.asker.ask("frame", movable, poses));
+                this.#showFrame(await view.asker.ask("frame", movable, poses));
             } catch (error) {
+                // What was known of another frame is no answer.
+                this.#touching.clear();
+                this.recolour();
+                this.#overlay.clear();
+                fill(this.#list);
                 fill(this.#frameBox, h("p", { class: "problem" }, messageOf(error)));
+                view.setAnswer({ distance: null, error: messageOf(error), frame: this.frame });
             }
         });
     }
 
     #showFrame({ touching, nearest, took }: FrameAnswer): void {
-        const { app } = this;
-        const { palette } = app.stage;
+        const { view } = this;
+        const { palette } = view.stage;
         this.#touching = new Set(touching);
         this.recolour();
         this.#overlay.clear();
@@ -159,7 +165,7 @@ export class SceneView {
             this.#overlay.label(short(nearest.distance), nearest.pointA, "near");
         }
         const pairs = touching.length / 2;
-        app.setAnswer({ distance: nearest?.distance ?? null, touching: pairs, frame: this.frame, took });
+        view.setAnswer({ distance: nearest?.distance ?? null, touching: pairs, frame: this.frame, took });
         fill(
             this.#frameBox,
             h("div", { class: `relation ${pairs > 0 ? "hit" : "free"}` }, pairs > 0 ? "Touching" : "Apart"),
@@ -221,10 +227,10 @@ export class SceneView {
 
     /** Colours instances that touch. */
     recolour(): void {
-        this.app.bodies.forEach((body, k) => {
+        this.view.bodies.forEach((body, k) => {
             body.setColour(this.colourOf(k));
             if (this.#chosen === undefined) {
-                body.setOpacity(this.app.opacityOf(body));
+                body.setOpacity(this.look.opacityOf(body));
             }
         });
     }
@@ -235,7 +241,7 @@ export class SceneView {
     }
 
     colourOf(instance: number): number {
-        const { palette } = this.app.stage;
+        const { palette } = this.view.stage;
         const place = this.#chosen?.indexOf(instance) ?? -1;
         if (place >= 0) {
             return place === 0 ? palette.a : palette.b;
@@ -249,25 +255,35 @@ export class SceneView {
         return this.#instances[instance]?.moving === true ? palette.moving : palette.still;
     }
 
-    /** Frames a pair and shows where it touches. */
+    /** Shows a pair, and says why if it has no answer. */
     async choose(a: number, b: number, clash?: ContentClash): Promise<void> {
+        try {
+            await this.#showPair(a, b, clash);
+        } catch (error) {
+            this.view.messages.say(messageOf(error), "error");
+        }
+    }
+
+    /** Frames a pair, and asks where it touches. */
+    async #showPair(a: number, b: number, clash?: ContentClash): Promise<void> {
         this.#chosen = [a, b];
-        const { app } = this;
-        const [first, second] = [app.bodies[a], app.bodies[b]];
+        const { view } = this;
+        const [first, second] = [view.bodies[a], view.bodies[b]];
         if (first === undefined || second === undefined) {
             return;
         }
-        const { palette } = app.stage;
-        app.bodies.forEach((body, k) => {
+        const { palette } = view.stage;
+        view.bodies.forEach((body, k) => {
             const isOne = k === a || k === b;
             body.setOpacity(isOne ? (clash === undefined ? 1 : 0.62) : 0.08);
         });
         this.recolour();
         this.#pairOverlay.clear();
-        const box = app.stage.boxOf([first.group, second.group]);
-        app.stage.fit(box, true);
-        const pose = await app.asker.ask("between", first.pose, second.pose);
-        const near = await app.asker.ask("near", first.side, second.side, pose);
+        const box = view.stage.boxOf([first.group, second.group]);
+        view.stage.fit(box, true);
+        const pose = await view.asker.ask("between", first.pose, second.pose);
+        const near = await view.asker.ask("near", first.side, second.side, pose);
+        view.setAnswer({ distance: near.distance.distance, pair: [a, b], contacts: near.contacts });
         const toWorld = (points: ArrayLike<number>) => {
             const moved: number[] = [];
             for (let k = 0; k + 2 < points.length; k += 3) {
@@ -278,7 +294,7 @@ export class SceneView {
         if (near.contacts > 0) {
             this.#pairOverlay.triangles(first, near.touchingA, palette.hit);
             this.#pairOverlay.triangles(second, near.touchingB, palette.hit);
-            const deep = await app.asker.ask("deep", first.side, second.side, pose);
+            const deep = await view.asker.ask("deep", first.side, second.side, pose);
             this.#pairOverlay.segments(toWorld(deep.curves), palette.hit, 2.5, { faint: 0.55 });
         } else {
             const ends = toWorld([...near.distance.pointA, ...near.distance.pointB]);
@@ -297,15 +313,15 @@ export class SceneView {
     release(): void {
         this.#chosen = undefined;
         this.#pairOverlay.clear();
-        for (const body of this.app.bodies) {
-            body.setOpacity(this.app.opacityOf(body));
+        for (const body of this.view.bodies) {
+            body.setOpacity(this.look.opacityOf(body));
         }
         this.recolour();
     }
 
     #listClashes(): void {
         const shown = this.#clashes.filter((clash) => this.#filter.value === "" || clash.class === this.#filter.value);
-        const rows = shown.slice(0, 2000).map((clash) => {
+        const rows = shown.slice(0, MAX_LISTED_CLASHES).map((clash) => {
             const depth =
                 clash.upper !== undefined
                     ? `depth ${short(clash.lower ?? 0)} to ${short(clash.upper)}`
@@ -323,9 +339,11 @@ export class SceneView {
                 this.#showClash(clash);
             });
         });
+        const more = shown.length - rows.length;
         fill(
             this.#clashBox,
             h("div", { class: "list", role: "listbox", "aria-label": "Clashes" }, ...rows),
+            more > 0 && h("p", { class: "muted" }, `and ${countOf(more)} more: choose a class`),
             h("div", { class: "clash-facts" }),
             h("button", { type: "button", class: "button", click: () => this.release() }, "Show all parts"),
         );
@@ -351,31 +369,26 @@ export class SceneView {
     }
 
     toggle(): void {
-        if (this.#timer !== 0) {
-            this.stop();
-            return;
-        }
-        if (this.#frames.length < 2) {
-            return;
-        }
-        fill(this.#play, ...iconButton("pause", "", () => {}).childNodes);
-        const step = async () => {
-            const began = performance.now();
-            await this.go((this.frame + 1) % this.#frames.length);
-            if (this.#timer !== 0) {
-                this.#timer = window.setTimeout(
-                    () => void step(),
-                    Math.max(0, 1000 / RATE - (performance.now() - began)),
-                );
-            }
-        };
-        this.#timer = window.setTimeout(() => void step(), 0);
+        this.#player.toggle();
     }
 
     stop(): void {
-        clearTimeout(this.#timer);
-        this.#timer = 0;
-        fill(this.#play, ...iconButton("play", "", () => {}).childNodes);
+        this.#player.stop();
+    }
+
+    #begin(): (() => number) | undefined {
+        if (this.#frames.length < 2) {
+            return undefined;
+        }
+        let last = Number.NEGATIVE_INFINITY;
+        return () => {
+            const now = performance.now();
+            if (now - last < 1000 / RATE) {
+                return this.frame;
+            }
+            last = now;
+            return (this.frame + 1) % this.#frames.length;
+        };
     }
 
     /** Moves an instance that the user drags. */

@@ -179,7 +179,10 @@ test("B is dragged with the mouse, by its handle", { skip: WITHOUT }, async () =
     const { page, errors, close } = await open(pair());
     const before = await page.getAttribute("html", "data-answer");
     const [x, y] = await page.evaluate(() => {
-        const { stage, pair } = window.cbvhView;
+        const {
+            view: { stage },
+            pair,
+        } = window.cbvhView;
         const [px, py, pz] = [3, 7, 11].map((k) => pair.pose[k]);
         const at = stage.toStage([px, py, pz]).project(stage.camera);
         const { left, top, width, height } = stage.canvas.getBoundingClientRect();
@@ -215,7 +218,7 @@ test("keys move B, turn the view and list themselves", { skip: WITHOUT }, async 
     await changed(page, before);
     const turned = await answer(page);
     assert.notEqual(turned.pose[0], 1);
-    const view = () => page.evaluate(() => window.cbvhView.stage.camera.position.toArray());
+    const view = () => page.evaluate(() => window.cbvhView.view.stage.camera.position.toArray());
     const eye = await view();
     await page.keyboard.press("ArrowLeft");
     assert.notDeepEqual(await view(), eye);
@@ -287,7 +290,7 @@ test("the inside of a file has the numbers that dump prints", { skip: WITHOUT },
     assert.equal(await state(page), "ready");
     const dump = JSON.parse(command("dump", path.join(folder, "ring.obj.cbvh"), "--json"));
     const contents = await page.evaluate(async () => {
-        const found = await window.cbvhView.asker.ask("contents", 0);
+        const found = await window.cbvhView.view.asker.ask("contents", 0);
         return { ...found, levelCounts: [...found.levelCounts], levelLengths: [...found.levelLengths] };
     });
     assert.deepEqual(
@@ -305,7 +308,7 @@ test("the inside of a file has the numbers that dump prints", { skip: WITHOUT },
     });
     // The nodes of each level cover all triangles: each corner is within one of them, for boxes and for all slabs.
     const outside = await page.evaluate(async (depth) => {
-        const { asker, bodies } = window.cbvhView;
+        const { asker, bodies } = window.cbvhView.view;
         const { positions } = bodies[0].shown;
         const missed = [];
         for (const slabs of ["boxes", "all"]) {
@@ -359,7 +362,10 @@ test("what a question visits is counted on both meshes", { skip: WITHOUT }, asyn
     await page.selectOption('select[aria-label="Colours of triangles"]', "visits");
     await page.waitForSelector("text=packet tests");
     const found = await page.evaluate(async () => {
-        const { asker, pair } = window.cbvhView;
+        const {
+            view: { asker },
+            pair,
+        } = window.cbvhView;
         const { nodeTests, packetTests, a, b } = await asker.ask(
             "visits",
             pair.a.side,
@@ -485,7 +491,7 @@ test("a link restores the pose and the view, and the command asks the same", { s
     await page.click("#tab-inside");
     const texts = await page.evaluate(async () => {
         const copied = [];
-        window.cbvhView.copy = async (text) => {
+        window.cbvhView.view.copy = async (text) => {
             copied.push(text);
         };
         document.querySelector('[aria-label="Copy a link to this view"]').click();
@@ -550,9 +556,28 @@ test("pages of the command show objects, scenes and clashes of one file", { skip
         command(...words, out);
         const { page, errors, close } = await open(readFileSync(out, "utf8"));
         assert.deepEqual([await state(page), errors], ["ready", []]);
-        const triangles = await page.evaluate(() => window.cbvhView.bodies.map((body) => body.shown.summary.triangles));
-        const boxes = await page.evaluate(() => window.cbvhView.bodies.map((body) => [...body.shown.centre]));
-        const found = { ...(await answer(page)), triangles, boxes };
+        const triangles = await page.evaluate(() =>
+            window.cbvhView.view.bodies.map((body) => body.shown.summary.triangles),
+        );
+        const boxes = await page.evaluate(() => window.cbvhView.view.bodies.map((body) => [...body.shown.centre]));
+        const inside = await page.evaluate(async () => {
+            const { asker, bodies } = window.cbvhView.view;
+            const [objects, nodes] = [[], []];
+            for (const { file } of bodies) {
+                objects.push((await asker.ask("place", file, 0)).object);
+                nodes.push((await asker.ask("level", file, 0, 100, "boxes")).count);
+            }
+            return { objects, nodes };
+        });
+        const line = await page.evaluate(() => {
+            let copied;
+            window.cbvhView.view.copy = async (text) => {
+                copied = text;
+            };
+            document.querySelector('[aria-label^="Copy the command line"]').click();
+            return copied;
+        });
+        const found = { ...(await answer(page)), triangles, boxes, line, ...inside };
         await close();
         return found;
     };
@@ -561,12 +586,100 @@ test("pages of the command show objects, scenes and clashes of one file", { skip
     const asked = JSON.parse(command("query", objects, objects, ...words, "--mode", "distance", "--json"));
     const pair = await view("view", objects, ...words, "-o");
     assert.deepEqual([pair.distance, pair.triangles, pair.boxes[0]], [asked.distance, [12, 12], [4, 0, 0]]);
+    // The inside of an object: its own triangles and nodes, and the name that the command line takes.
+    assert.deepEqual(
+        [pair.objects, pair.nodes],
+        [
+            [1, 1],
+            [1, 1],
+        ],
+    );
+    assert.ok(pair.line.endsWith(" --object far"), pair.line);
+    const asks = pair.line
+        .split(" ")
+        .slice(1, 4)
+        .concat(["--mode", "distance", ...words]);
+    assert.ok(command(...asks).startsWith(`distance ${pair.distance}`));
 
     const scene = await view("view", parts, "-o");
     assert.deepEqual([scene.distance, scene.touching, scene.triangles], [3, 0, [12, 12]]);
 
     const clash = await view("clash", parts, "--clearance", 4, "--view");
-    assert.deepEqual(clash.triangles, [12, 12]);
+    // The report is the command's: the page has no answer of its own before somebody chooses a clash.
+    assert.deepEqual([clash.triangles, clash.clashes, clash.distance], [[12, 12], 1, null]);
+});
+
+test("numbers that are no pose have no answer, and the next ones have", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(pair());
+    const { distance } = await answer(page);
+    const type = async (name, text) => {
+        await page.fill(`textarea[aria-label="${name}"]`, text);
+        await page.locator(`textarea[aria-label="${name}"]`).blur();
+    };
+    const skew = "1 0.5 0 4.5  0 1 0 0.25  0 0 1 0.125";
+    await type("Twelve numbers of the pose", skew);
+    await page.waitForSelector("#page-pair .problem");
+    const said = await answer(page);
+    assert.equal(said.distance, null);
+    assert.match(said.error, /rigid|rotation/);
+    await type("Twelve numbers of the pose", "1 0 0 1e999 0 1 0 0 0 0 1 0");
+    await page.waitForSelector("text=found one that is not finite");
+    await type("Twelve numbers of the pose", BESIDE.join(" "));
+    await page.waitForFunction((d) => JSON.parse(document.documentElement.dataset.answer).distance === d, distance);
+    assert.equal(await page.locator("#page-pair .problem").count(), 0);
+
+    await page.click("#tab-motion");
+    await type("24 numbers of the motion", `${skew} ${skew}`);
+    await page.waitForSelector("#page-motion .problem");
+    assert.equal(await page.evaluate(() => window.cbvhView.motion.motion), undefined);
+    await page.keyboard.press("Space");
+    await page.keyboard.press("]");
+    await type("24 numbers of the motion", `${BESIDE.join(" ")} ${BESIDE.join(" ")}`);
+    await page.waitForSelector("#page-motion .relation.free");
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a motion that comes near is not called a hit", { skip: WITHOUT }, async () => {
+    const at = (y) => [1, 0, 0, 4.5, 0, 1, 0, y, 0, 0, 1, 0.125];
+    // B goes by, hardly farther away than the clearance.
+    const show = { kind: "motion", motion: [...at(-2), ...at(2)], clearance: 1.29, tolerance: 0.5 };
+    const files = [
+        ["ring.cbvh", RING()],
+        ["box.cbvh", BOX()],
+    ];
+    const { page, errors, close } = await open(filled(files, show));
+    await page.waitForSelector("#page-motion .relation.near");
+    const shown = await page.locator("#page-motion, .stage").allInnerTexts();
+    assert.deepEqual([shown.length, /first hit/i.test(shown.join())], [2, false]);
+    await page.click("text=Go to this moment");
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a link with wrong numbers still shows the meshes", { skip: WITHOUT }, async () => {
+    const skew = "1,0.5,0,0,0,1,0,0,0,0,1,0";
+    const far = "view=1e300,0,0,0,0,0&time=-5&frame=1e9&triangle=7,1e9&tab=nothing&draw=zzz&paint=zzz&level=-1e9";
+    for (const hash of [
+        `#pose=${skew}&${far}`,
+        `#motion=${skew},${skew}&clearance=-1&${far}`,
+        "#pose=1,2&view=,,",
+        "#%",
+    ]) {
+        const { page, errors, close } = await open(pair(), { hash });
+        assert.deepEqual([await state(page), errors], ["ready", []], hash);
+        await close();
+    }
+    const show = scene();
+    const files = [
+        ["ring.cbvh", RING()],
+        ["box.cbvh", BOX()],
+    ];
+    const { page, errors, close } = await open(filled(files, show), { hash: "#frame=1e9&triangle=0,-3" });
+    assert.deepEqual([await state(page), (await answer(page)).frame, errors], ["ready", show.frames.length - 1, []]);
+    await page.keyboard.press("]");
+    assert.equal((await answer(page)).frame, show.frames.length - 1);
+    await close();
 });
 
 test("a clash report frames the chosen pair", { skip: WITHOUT }, async () => {

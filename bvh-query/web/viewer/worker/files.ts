@@ -51,18 +51,23 @@ export class LoadedFile {
     #duplicates: Uint32Array = new Uint32Array();
     /** The place of each id in the drawn order, plus one; one list for each object if the file has no ids. */
     #places: Uint32Array[] | undefined;
-    /** The corners of all triangles, which are kept for the objects that are drawn by themselves. */
-    #positions: Float32Array | undefined;
+    /** Whether all objects of the mesh are closed; `undefined` if the file does not say so. */
+    readonly closed: boolean | undefined;
+    /** The page of the file at which the mesh begins. */
+    readonly #firstPage: number;
 
-    /** @param of The file that has the mesh, and the number of the object that the mesh is. */
     constructor(
         readonly number: number,
         readonly name: string,
         readonly mesh: Mesh,
-        private readonly of?: { whole: LoadedFile; object: number },
     ) {
         const [x0 = 0, y0 = 0, z0 = 0, x1 = 0, y1 = 0, z1 = 0] = mesh.bounds;
         this.centre = Float64Array.of((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2);
+        const [first = 0, end = 0] = raw.objectNumbers(this.raw) as Uint32Array;
+        const objects = this.objects().slice(first, end);
+        const closed = objects.map((object) => object.closed);
+        this.closed = closed.includes(undefined) ? undefined : closed.every((one) => one === true);
+        this.#firstPage = objects[0]?.firstPage ?? 0;
     }
 
     get raw(): raw.Mesh {
@@ -71,9 +76,6 @@ export class LoadedFile {
 
     summary(): FileSummary {
         const { number, name, mesh } = this;
-        const objects =
-            this.of === undefined ? this.objects() : this.objects().slice(this.of.object, this.of.object + 1);
-        const closed = objects.map((object) => object.closed);
         return {
             number,
             name,
@@ -83,15 +85,15 @@ export class LoadedFile {
             objects: mesh.names,
             radius: mesh.radius,
             solid: mesh.isSolid,
-            closed: closed.includes(undefined) ? undefined : closed.every((one) => one === true),
+            closed: this.closed,
             drawn: mesh.triangleCount <= MAX_DRAWN_TRIANGLES,
         };
     }
 
-    /** The objects, as the file states them. */
+    /** All objects of the file, as it states them. */
     objects() {
         const [profiles, encodings, numbers] = raw.objects(this.raw) as [string[], string[], Float64Array];
-        const { names } = this.of?.whole.mesh ?? this.mesh;
+        const { names } = this.mesh;
         return profiles.map((profile, object) => {
             const of = (place: number) => numbers[10 * object + place] ?? 0;
             const closed = of(9);
@@ -115,26 +117,21 @@ export class LoadedFile {
 
     /** The sections of the file, with the version of the format. */
     sections() {
-        const [version, names, starts, lengths] = raw.sections(this.raw) as [
+        const [version, headerBytes, names, starts, lengths] = raw.sections(this.raw) as [
             string,
+            number,
             string[],
             Float64Array,
             Float64Array,
         ];
         const sections = names.map((name, k) => ({ name, start: starts[k] ?? 0, bytes: lengths[k] ?? 0 }));
-        return { version, sections };
+        return { version, headerBytes, sections };
     }
 
     /** Reads and checks all triangles. */
     triangles(): Triangles {
-        const positions = this.of === undefined ? this.#read() : this.#readObject(this.of.whole, this.of.object);
-        this.#places = undefined;
-        return { centre: this.centre.slice(), positions, pageStarts: this.#pageStarts.slice() };
-    }
-
-    /** Reads the triangles of the file, with corners relative to its centre. */
-    #read(): Float32Array {
-        const [x = 0, y = 0, z = 0] = this.centre;
+        const { centre } = this;
+        const [x = 0, y = 0, z = 0] = centre;
         const [positions, ids, packets, slots, pageStarts, duplicates] = raw.storedTriangles(this.raw, x, y, z) as [
             Float32Array,
             Uint32Array,
@@ -148,21 +145,8 @@ export class LoadedFile {
         this.#slots = slots;
         this.#pageStarts = pageStarts;
         this.#duplicates = duplicates;
-        return positions;
-    }
-
-    /** Takes the triangles of an object out of those of its file, which are read once. */
-    #readObject(whole: LoadedFile, object: number): Float32Array {
-        whole.#positions ??= whole.#read();
-        const { firstPage = 0, pages = 0 } = this.objects()[object] ?? {};
-        const [start = 0, end = 0] = [whole.#pageStarts[firstPage], whole.#pageStarts[firstPage + pages]];
-        this.#ids = whole.#ids?.slice(start, end);
-        this.#packets = whole.#packets.slice(start, end);
-        this.#slots = whole.#slots.slice(start, end);
-        this.#pageStarts = whole.#pageStarts.map((place) => Math.min(Math.max(place, start), end) - start);
-        this.#duplicates = whole.#duplicates;
-        const shift = this.centre.map((middle, axis) => middle - (whole.centre[axis] ?? 0));
-        return whole.#positions.slice(9 * start, 9 * end).map((value, k) => value - (shift[k % 3] ?? 0));
+        this.#places = undefined;
+        return { centre: centre.slice(), positions, pageStarts: pageStarts.slice() };
     }
 
     /** Where triangles are in the drawn order, given their objects and ids; those that are not drawn are left out. */
@@ -201,13 +185,18 @@ export class LoadedFile {
             return places;
         };
         const hasIds = this.sections().sections.some((section) => section.name === "ids");
-        if (hasIds || this.of !== undefined) {
-            return [list(0, ids.length, hasIds ? this.#duplicates : new Uint32Array())];
+        if (hasIds) {
+            return [list(0, ids.length, this.#duplicates)];
         }
-        return this.objects().map(({ firstPage, pages }) => {
-            const [start = 0, end = 0] = [this.#pageStarts[firstPage], this.#pageStarts[firstPage + pages]];
-            return list(start, end, new Uint32Array());
-        });
+        return this.objects().map(({ firstPage, pages }) =>
+            list(this.#startOf(firstPage), this.#startOf(firstPage + pages), new Uint32Array()),
+        );
+    }
+
+    /** The number of drawn triangles before a page of the file. */
+    #startOf(page: number): number {
+        const last = this.#pageStarts.length - 1;
+        return this.#pageStarts[Math.min(Math.max(page - this.#firstPage, 0), last)] ?? 0;
     }
 
     /** The page of a drawn triangle. */
@@ -221,7 +210,7 @@ export class LoadedFile {
                 high = middle;
             }
         }
-        return low;
+        return this.#firstPage + low;
     }
 
     /** Says where a drawn triangle is stored. */
@@ -248,8 +237,8 @@ export class LoadedFile {
         const counts = new Uint32Array(numbers.length);
         for (let k = 0; k < rows.length; k += 3) {
             const [page = 0, number = 0, count = 0] = rows.subarray(k, k + 3);
-            const end = this.#pageStarts[page + 1] ?? 0;
-            for (let at = this.#pageStarts[page] ?? 0; at < end; at++) {
+            const end = this.#startOf(page + 1);
+            for (let at = this.#startOf(page); at < end; at++) {
                 if (numbers[at] === number) {
                     counts[at] = count;
                 }
@@ -301,10 +290,9 @@ export function add(name: string, bytes: Uint8Array, onStage: (stage: string) =>
 
 /** Opens an object of a file by itself, or all of it as solid. A number below 0 stands for all objects. */
 export function addPart(number: number, object: number, solid: boolean): FileSummary {
-    const whole = file(number);
-    const mesh = object < 0 ? whole.mesh : whole.mesh.object(object);
-    const of = object < 0 ? undefined : { whole, object };
-    const added = new LoadedFile(files.length, whole.name, solid ? mesh.solid() : mesh, of);
+    const { name, mesh } = file(number);
+    const part = object < 0 ? mesh : mesh.object(object);
+    const added = new LoadedFile(files.length, name, solid ? part.solid() : part);
     files.push(added);
     return added.summary();
 }

@@ -77,12 +77,8 @@ export function near(a: Side, b: Side, pose: Float64Array, within?: number): Nea
         const distance = first.distance(second, pose);
         const distanceTook = performance.now() - began;
         const pairs = distance.distance === 0 ? first.contacts(second, pose) : new Uint32Array();
-        let relation: Relation | undefined;
-        try {
-            relation = first.relation(second, pose);
-        } catch {
-            // The file does not state which objects are closed.
-        }
+        const isStated = [a, b].every((side) => file(side.file).closed !== undefined);
+        const relation = isStated ? first.relation(second, pose) : undefined;
         const took = performance.now() - began;
         const column = (place: number) =>
             Uint32Array.from({ length: pairs.length / 4 }, (_, k) => pairs[4 * k + place] ?? 0);

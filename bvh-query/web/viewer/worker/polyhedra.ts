@@ -1,22 +1,5 @@
 /** Makes polyhedra from the slabs of nodes: half-spaces cut a box, one after the other. */
 
-/** The fixed directions of the format: 3 axes, 4 cube diagonals, 6 face diagonals. */
-const DIRECTIONS: readonly (readonly [number, number, number])[] = [
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-    [1, 1, 1],
-    [1, 1, -1],
-    [1, -1, 1],
-    [-1, 1, 1],
-    [1, 1, 0],
-    [1, 0, 1],
-    [0, 1, 1],
-    [1, -1, 0],
-    [1, 0, -1],
-    [0, 1, -1],
-];
-
 /** How many numbers a node has: the lower ends of 13 slabs, the upper ends, a direction of its own, and both ends there. */
 export const NODE_NUMBERS = 31;
 
@@ -128,19 +111,21 @@ function cross(a: readonly number[], b: readonly number[]): Point {
 /** Which slabs bound a polyhedron. */
 export type Slabs = "boxes" | "fixed" | "all";
 
-function polyhedron(node: Float32Array, slabs: Slabs): Face[] {
+function polyhedron(node: Float32Array, slabs: Slabs, directions: Float64Array): Face[] {
     let faces = box(node);
     if (slabs === "boxes") {
         return faces;
     }
     const size = Math.max(...[0, 1, 2].map((axis) => (node[13 + axis] ?? 0) - (node[axis] ?? 0)));
-    const tolerance = size * 1e-6;
+    // Ends of slabs are f32, whose steps are 2^-24 of the size: corners that are nearer than some of these are one.
+    const tolerance = size * 2 ** -20;
     for (let slab = 3; slab < 13; slab++) {
         const [lo = 0, hi = 0] = [node[slab], node[13 + slab]];
-        const direction = DIRECTIONS[slab] ?? [0, 0, 0];
+        const direction = Array.from(directions.subarray(3 * slab, 3 * slab + 3));
         if (Number.isFinite(lo)) {
             faces = cut(faces, direction, hi, tolerance, false);
-            faces = cut(faces, direction.map((c) => -c) as Point, -lo, tolerance, false);
+            const opposite = direction.map((component) => -component);
+            faces = cut(faces, opposite, -lo, tolerance, false);
         }
     }
     const [x = 0, y = 0, z = 0, lo = 0, hi = 0] = node.subarray(26, 31);
@@ -170,17 +155,22 @@ export interface Polyhedra {
     triangles: Uint8Array;
 }
 
-/** Makes the polyhedra of nodes, whose numbers are relative to the origins of their objects. */
+/**
+ * Makes the polyhedra of nodes, whose numbers are relative to the origins of their objects.
+ *
+ * @param directions The fixed directions of the format, three numbers for each.
+ */
 export function polyhedra(
     [numbers, objects, places, triangles, origins]: [Float32Array, Uint32Array, Uint32Array, Uint8Array, Float64Array],
     centre: Float64Array,
     slabs: Slabs,
+    directions: Float64Array,
 ): Polyhedra {
     const [positions, turning, edges]: [number[], number[], number[]] = [[], [], []];
     const [starts, edgeStarts] = [new Uint32Array(objects.length + 1), new Uint32Array(objects.length + 1)];
     for (let k = 0; k < objects.length; k++) {
         const shift = [0, 1, 2].map((axis) => (origins[3 * (objects[k] ?? 0) + axis] ?? 0) - (centre[axis] ?? 0));
-        for (const face of polyhedron(numbers.subarray(NODE_NUMBERS * k, NODE_NUMBERS * (k + 1)), slabs)) {
+        for (const face of polyhedron(numbers.subarray(NODE_NUMBERS * k, NODE_NUMBERS * (k + 1)), slabs, directions)) {
             const corners = face.corners.map((corner) => corner.map((value, axis) => value + (shift[axis] ?? 0)));
             const count = corners.length;
             for (let place = 0; place < count; place++) {

@@ -59,7 +59,7 @@ const handlers = {
     level: (file: number, level: number, most: number, slabs: Slabs) => {
         const of = files.file(file);
         const nodes = raw.levelNodes(of.raw, level, most) as Parameters<typeof polyhedra>[0];
-        return polyhedra(nodes, of.centre, slabs);
+        return polyhedra(nodes, of.centre, slabs, raw.directions());
     },
 
     firstHit: (file: number, origin: Float64Array, direction: Float64Array, pose?: Float64Array) => {
@@ -70,16 +70,9 @@ const handlers = {
             places: files.file(file).placesOf(hits.object, hits.triangle),
         };
     },
-    points: (file: number, points: Float64Array, pose?: Float64Array) => {
-        const { mesh } = files.file(file);
-        const sides = (() => {
-            try {
-                return mesh.sides(points, { pose });
-            } catch {
-                // The file does not state which objects are closed.
-                return undefined;
-            }
-        })();
+    points: (number: number, points: Float64Array, pose?: Float64Array) => {
+        const { mesh, closed } = files.file(number);
+        const sides = closed !== undefined ? mesh.sides(points, { pose }) : undefined;
         return { closest: mesh.closestPoints(points, { pose }), sides };
     },
     rays: (file: number, origins: Float64Array, directions: Float64Array, pose?: Float64Array) =>
