@@ -2,7 +2,7 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
-use crate::robot::{Pair, Part, Setting};
+use crate::setting::{Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, Querier, QueryError};
 
 /// A querier, and where everything is in the configuration in question.

@@ -29,7 +29,7 @@ use crate::edge::{Bounds, Edge, at, parts_of};
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
 use crate::model::{Joint, Kind, Model};
-use crate::robot::{Pair, Part, Setting};
+use crate::setting::{Pair, Part, Setting};
 use bvh_query::{Pose, PoseError, RigidPath};
 
 /// The path of B in A's frame, where B is the smaller one of a pair: its points are nearer to the axes that it turns about.
@@ -201,7 +201,7 @@ impl Kind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Base;
+    use crate::options::Base;
     use crate::testing::{robot, tree, values};
     use cbvh_testkit::Random;
 

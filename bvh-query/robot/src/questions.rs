@@ -2,7 +2,8 @@
 
 use crate::asker::{Asker, Nearest};
 use crate::error::RobotError;
-use crate::robot::{Robot, Setting};
+use crate::robot::Robot;
+use crate::setting::Setting;
 use bvh_query::Distance;
 use rayon::prelude::*;
 use std::collections::HashMap;

@@ -1,171 +1,17 @@
-//! A robot: its links, what stands around it, and the pairs of both that are asked about.
+//! A robot: reads it, and changes what stands around it and which pairs are asked about.
 
 use crate::asker::Asker;
 use crate::error::RobotError;
-use crate::frame::{Frame, Point, length};
-use crate::model::{Chain, Model};
+use crate::frame::Frame;
+use crate::options::RobotOptions;
+use crate::setting::{Body, Part, Setting};
 use crate::shapes::Shapes;
 use crate::srdf::{self, Group, Semantics, State};
 use crate::urdf;
-use bvh_query::{OwnedShape, Pose, Shape};
-use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use bvh_query::{OwnedShape, Pose};
+use std::collections::HashSet;
+use std::path::Path;
 use std::sync::Arc;
-
-/// Which shapes of links are asked about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Geometry {
-    /// Those that the URDF names for collisions.
-    #[default]
-    Collision,
-    /// Those that it names for pictures.
-    Visual,
-}
-
-/// How the root of a robot is connected with the world.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Base {
-    /// It stands at the origin.
-    #[default]
-    Fixed,
-    /// It moves in the plane z = 0: three more joint values come first, `base/x`, `base/y` and `base/theta`.
-    Planar,
-    /// It moves freely: seven more joint values come first, `base/x` to `base/z` and a quaternion, `base/qx` to `base/qw`.
-    Floating,
-}
-
-/// How a robot is read.
-#[derive(Debug, Clone)]
-pub struct RobotOptions {
-    /// Folders in which packages are looked for, before those of `ROS_PACKAGE_PATH` and those above the URDF file.
-    pub packages: Vec<PathBuf>,
-    /// An SRDF file, whose disabled pairs are not asked about.
-    pub srdf: Option<PathBuf>,
-    /// Which shapes of links are asked about.
-    pub geometry: Geometry,
-    /// How the root is connected with the world.
-    pub base: Base,
-    /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000.
-    pub cylinder_error: f64,
-    /// A folder for baked meshes, under names that follow from content, so that they are baked once.
-    pub cache: Option<PathBuf>,
-}
-
-impl Default for RobotOptions {
-    fn default() -> Self {
-        Self {
-            packages: Vec::new(),
-            srdf: None,
-            geometry: Geometry::Collision,
-            base: Base::Fixed,
-            cylinder_error: 1e-3,
-            cache: None,
-        }
-    }
-}
-
-/// A link, an obstacle or an attached object: shapes that do not move against each other.
-#[derive(Clone, Debug)]
-struct Body {
-    name: String,
-    is_link: bool,
-    /// The link that it is attached to.
-    link: Option<usize>,
-}
-
-/// A shape of a body.
-#[derive(Clone, Debug)]
-pub(crate) struct Part {
-    pub(crate) body: usize,
-    /// The group of links that carries it; 0 of what stands in the world.
-    pub(crate) group: usize,
-    /// Whether it is an obstacle.
-    is_still: bool,
-    /// Where it is in the group.
-    pub(crate) origin: Frame,
-    /// With the margin as a part of its radius.
-    pub(crate) shape: OwnedShape,
-    /// The shape as it was given.
-    bare: OwnedShape,
-    /// The middle of a ball around it, in its own frame and in the group, and the ball's radius.
-    pub(crate) middle: Point,
-    pub(crate) centre: Point,
-    pub(crate) radius: f64,
-    /// The middle of the box around it, in its own frame, and half of the box's sides.
-    pub(crate) middle_of_box: Point,
-    pub(crate) half: Point,
-}
-
-impl Part {
-    pub(crate) fn new(
-        body: usize,
-        (group, is_still): (usize, bool),
-        origin: Frame,
-        bare: OwnedShape,
-        margin: f64,
-    ) -> Result<Self, RobotError> {
-        let shape = bare.clone().rounded(bare.shape().radius() + margin)?;
-        let (middle_of_box, half) = bounds(shape.shape());
-        let (middle, radius) = ball(shape.shape());
-        let centre = origin.place(middle);
-        Ok(Self { body, group, is_still, origin, shape, bare, middle, centre, radius, middle_of_box, half })
-    }
-}
-
-/// Returns the middle of the box around a shape, and half of its sides.
-fn bounds(shape: Shape<'_>) -> (Point, Point) {
-    let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for object in shape.objects() {
-        let [low, high] = object.bounding_box();
-        for k in 0..3 {
-            (lo[k], hi[k]) = (lo[k].min(low[k]), hi[k].max(high[k]));
-        }
-    }
-    let half = [0, 1, 2].map(|k| ((hi[k] - lo[k]) / 2.0 + shape.radius()) * ROUNDED_UP);
-    ([0, 1, 2].map(|k| lo[k] + (hi[k] - lo[k]) / 2.0), half)
-}
-
-/// Returns a ball around a shape, in the shape's frame.
-fn ball(shape: Shape<'_>) -> (Point, f64) {
-    let (middle, half) = bounds(shape);
-    let corner = length(half.map(|half| half - shape.radius()));
-    let tight = match shape.objects() {
-        [object] => Some(object.bounding_sphere()).filter(|(_, tight)| *tight < corner),
-        _ => None,
-    };
-    let (middle, radius) = tight.unwrap_or((middle, corner));
-    (middle, (radius + shape.radius()) * ROUNDED_UP)
-}
-
-/// More than all roundings of a ball's middle and radius.
-const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
-
-/// Two parts that are asked about, A before B.
-#[derive(Clone, Debug)]
-pub(crate) struct Pair {
-    pub(crate) a: usize,
-    pub(crate) b: usize,
-    /// The sum of the radii of both balls.
-    pub(crate) reach: f64,
-    /// The joints between both.
-    pub(crate) chain: Arc<Chain>,
-}
-
-/// What does not change while questions are asked: all threads share it.
-#[derive(Clone, Debug)]
-pub(crate) struct Setting {
-    pub(crate) model: Arc<Model>,
-    pub(crate) parts: Vec<Part>,
-    pub(crate) pairs: Vec<Pair>,
-    bodies: Vec<Option<Body>>,
-}
-
-impl Setting {
-    /// Returns the name of the body of a part.
-    pub(crate) fn name(&self, part: usize) -> &str {
-        self.bodies[self.parts[part].body].as_ref().map_or("", |body| &body.name)
-    }
-}
 
 /// A robot among obstacles, asked about with the values of its joints.
 ///
@@ -528,23 +374,6 @@ impl Robot {
         if !std::mem::take(&mut self.is_stale) {
             return;
         }
-        let setting = Arc::make_mut(&mut self.setting);
-        let mut chains: HashMap<[usize; 2], Arc<Chain>> = HashMap::new();
-        let mut pairs = Vec::new();
-        for (a, one) in setting.parts.iter().enumerate() {
-            for (b, other) in setting.parts.iter().enumerate().skip(a + 1) {
-                // An obstacle is asked about with all links, also with those that never move.
-                let is_rigid = one.group == other.group && one.is_still == other.is_still;
-                if is_rigid || self.allowed.contains(&[one.body, other.body]) {
-                    continue;
-                }
-                let key = [one.group, other.group];
-                let chain =
-                    chains.entry(key).or_insert_with(|| Arc::new(setting.model.chain(key[0], key[1])));
-                let reach = (one.radius + other.radius) * ROUNDED_UP;
-                pairs.push(Pair { a, b, reach, chain: Arc::clone(chain) });
-            }
-        }
-        setting.pairs = pairs;
+        Arc::make_mut(&mut self.setting).list_pairs(&self.allowed);
     }
 }

@@ -3,8 +3,8 @@
 use crate::collada;
 use crate::error::RobotError;
 use crate::frame::Point;
+use crate::options::RobotOptions;
 use crate::packages::find;
-use crate::robot::RobotOptions;
 use crate::urdf::{Described, Element};
 use bvh_bake::input::mesh::Mesh;
 use bvh_bake::{BakeError, Options, read_meshes, shapes, to_bytes, write_atomically};

@@ -1,6 +1,7 @@
 //! Robots at random, for tests.
 
-use crate::robot::{Base, Robot, RobotOptions};
+use crate::options::{Base, RobotOptions};
+use crate::robot::Robot;
 use cbvh_testkit::Random;
 use std::fmt::Write;
 

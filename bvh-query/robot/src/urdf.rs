@@ -6,7 +6,7 @@
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
 use crate::model::{Kind, Link, Model, Value};
-use crate::robot::{Base, Geometry, RobotOptions};
+use crate::options::{Base, Geometry, RobotOptions};
 use crate::xml::{Description, child, children, text_of};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};

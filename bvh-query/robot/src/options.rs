@@ -1,0 +1,55 @@
+//! How a robot is read: which shapes, which base, and where meshes are.
+
+use std::path::PathBuf;
+
+/// Which shapes of links are asked about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Geometry {
+    /// Those that the URDF names for collisions.
+    #[default]
+    Collision,
+    /// Those that it names for pictures.
+    Visual,
+}
+
+/// How the root of a robot is connected with the world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Base {
+    /// It stands at the origin.
+    #[default]
+    Fixed,
+    /// It moves in the plane z = 0: three more joint values come first, `base/x`, `base/y` and `base/theta`.
+    Planar,
+    /// It moves freely: seven more joint values come first, `base/x` to `base/z` and a quaternion, `base/qx` to `base/qw`.
+    Floating,
+}
+
+/// How a robot is read.
+#[derive(Debug, Clone)]
+pub struct RobotOptions {
+    /// Folders in which packages are looked for, before those of `ROS_PACKAGE_PATH` and those above the URDF file.
+    pub packages: Vec<PathBuf>,
+    /// An SRDF file, whose disabled pairs are not asked about.
+    pub srdf: Option<PathBuf>,
+    /// Which shapes of links are asked about.
+    pub geometry: Geometry,
+    /// How the root is connected with the world.
+    pub base: Base,
+    /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000.
+    pub cylinder_error: f64,
+    /// A folder for baked meshes, under names that follow from content, so that they are baked once.
+    pub cache: Option<PathBuf>,
+}
+
+impl Default for RobotOptions {
+    fn default() -> Self {
+        Self {
+            packages: Vec::new(),
+            srdf: None,
+            geometry: Geometry::Collision,
+            base: Base::Fixed,
+            cylinder_error: 1e-3,
+            cache: None,
+        }
+    }
+}
