@@ -90,6 +90,7 @@ class View(unittest.TestCase):
         instance = show["instances"][two]
         self.assertEqual(files[instance["file"]], self.large.tobytes())
         self.assertEqual((instance["margin"], instance["member"], instance["meets"]), (0.25, 1, 2))
+        self.assertEqual([show["instances"][one][field] for field in ("member", "meets")], [2**32 - 1] * 2)
         self.assertEqual((instance["pose"], instance["moving"]), (rows(shifts([0, 0, 9])[0]), False))
         self.assertEqual([sorted(pair) for pair in show["allowed"]], [sorted([one, two])])
         self.assertEqual([(sorted(pair), margin) for *pair, margin in show["pair_margins"]], [(sorted([one, other]), 0.5)])

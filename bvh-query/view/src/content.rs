@@ -1,7 +1,7 @@
 //! What a page shows, as it says so in JSON.
 
 use crate::files::{Entry, Part};
-use bvh_query::{ClashClass, Groups, Pose};
+use bvh_query::{ClashClass, Pose};
 use serde::{Serialize, Serializer};
 
 /// The version of what pages say.
@@ -65,23 +65,10 @@ pub(crate) struct Instance {
     pub(crate) pose: Pose,
     pub(crate) margin: f64,
     pub(crate) moving: bool,
-    /// The groups that it is in and those that it meets, unless these are all, or follow from what moves.
-    #[serde(flatten)]
-    pub(crate) groups: Option<GroupsOf>,
-}
-
-/// The groups of an instance.
-#[derive(Debug, Serialize)]
-pub(crate) struct GroupsOf {
-    member: u32,
-    meets: u32,
-}
-
-impl GroupsOf {
-    pub(crate) fn new(groups: Groups) -> Option<Self> {
-        let Groups { member, meets } = groups;
-        (groups != Groups::ALL).then_some(Self { member, meets })
-    }
+    /// The groups that it is in.
+    pub(crate) member: u32,
+    /// The groups that it meets.
+    pub(crate) meets: u32,
 }
 
 /// The poses of all moving instances, in the order of the instances.

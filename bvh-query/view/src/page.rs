@@ -3,7 +3,7 @@
 //! The template has one line that the content replaces. A file is compressed and encoded as text while it is written, so
 //! that no copy of it is made in memory.
 
-use crate::content::{Content, Found, Frame, GroupsOf, Instance, Show, VERSION};
+use crate::content::{Content, Found, Frame, Instance, Show, VERSION};
 use crate::files::{Files, Named, Part};
 use crate::{PageError, json};
 use base64::engine::general_purpose::STANDARD;
@@ -58,9 +58,8 @@ pub struct Placed {
     pub pose: Pose,
     /// How much farther it reaches on all sides, in mesh units.
     pub margin: f64,
-    /// Its groups. `None` lets them follow from what moves: questions are then about all pairs in which an instance moves, or
-    /// about all pairs if none does.
-    pub groups: Option<Groups>,
+    /// The groups that it is in and those that it meets, which select the pairs that the page asks about.
+    pub groups: Groups,
     /// Whether frames move it.
     pub moving: bool,
 }
@@ -242,7 +241,8 @@ fn instances(placed: impl IntoIterator<Item = Placed>) -> Result<(Files, Vec<Ins
     let instances = placed.into_iter().map(|Placed { name, of, pose, margin, groups, moving }| {
         length("margin", margin)?;
         let (file, part) = files.add(of)?;
-        Ok(Instance { name, file, part, pose, margin, moving, groups: groups.and_then(GroupsOf::new) })
+        let Groups { member, meets } = groups;
+        Ok(Instance { name, file, part, pose, margin, moving, member, meets })
     });
     let instances = instances.collect::<Result<_, PageError>>()?;
     Ok((files, instances))

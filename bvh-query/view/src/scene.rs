@@ -13,9 +13,6 @@ pub struct Frames {
     pub moving: Vec<InstanceId>,
     /// In each frame, the poses of these instances, in the same order.
     pub poses: Vec<Vec<Pose>>,
-    /// Whether questions are about all pairs in which an instance moves, or about all pairs if none does. Otherwise the groups
-    /// of the instances select the pairs.
-    pub selects_pairs: bool,
 }
 
 impl Page {
@@ -44,7 +41,7 @@ impl Page {
                 of: Named { name: file_name, path, shape },
                 pose: *scene.pose(id)?,
                 margin: scene.margin(id)?,
-                groups: if frames.selects_pairs { None } else { Some(scene.groups(id)?) },
+                groups: scene.groups(id)?,
                 moving: moving.binary_search_by_key(&id, |(id, _)| *id).is_ok(),
             });
         }

@@ -32,7 +32,7 @@ fn shifted(x: f64) -> Pose {
 }
 
 fn placed(name: &str, of: Named, x: f64) -> Placed {
-    Placed { name: name.to_owned(), of, pose: shifted(x), margin: 0.0, groups: None, moving: false }
+    Placed { name: name.to_owned(), of, pose: shifted(x), margin: 0.0, groups: Groups::ALL, moving: false }
 }
 
 /// Returns two objects in one file.
@@ -199,11 +199,7 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
     scene.set_pair_margin(second, third, 0.25).unwrap();
     scene.set_groups(third, Groups { member: 2, meets: 5 }).unwrap();
     // The third instance is named first.
-    let frames = Frames {
-        moving: vec![third, first],
-        poses: vec![vec![shifted(30.0), shifted(10.0)]],
-        selects_pairs: false,
-    };
+    let frames = Frames { moving: vec![third, first], poses: vec![vec![shifted(30.0), shifted(10.0)]] };
     let page = |frames| Page::of_scene(&scene, frames, |_, _| ("block".into(), "block.obj".into())).unwrap();
     let (content, files) = unpacked(&page(&frames));
     assert_eq!(files.len(), 1);
@@ -214,13 +210,14 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
     };
     let (one, two, three) = (at(1.0), at(2.0), at(3.0));
     let frame = [at(10.0), at(30.0)].concat();
+    let all = u32::MAX;
     assert_eq!(
         content["show"],
         json!({
             "kind": "scene",
             "instances": [
-                { "name": "first", "file": 0, "pose": one, "margin": 0.0, "moving": true },
-                { "name": "#1", "file": 0, "pose": two, "margin": 0.5, "moving": false },
+                { "name": "first", "file": 0, "pose": one, "margin": 0.0, "moving": true, "member": all, "meets": all },
+                { "name": "#1", "file": 0, "pose": two, "margin": 0.5, "moving": false, "member": all, "meets": all },
                 { "name": "third", "file": 0, "pose": three, "margin": 0.0, "moving": true, "member": 2, "meets": 5 },
             ],
             "allowed": [[0, 2]],
@@ -228,8 +225,6 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
             "frames": [frame],
         })
     );
-    let (content, _) = unpacked(&page(&Frames { selects_pairs: true, ..frames.clone() }));
-    assert_eq!(content["show"]["instances"][2]["member"], Value::Null);
     let short = Frames { poses: vec![vec![shifted(1.0)]], ..frames };
     let refused = Page::of_scene(&scene, &short, |_, _| Default::default()).unwrap_err();
     assert!(matches!(refused, PageError::Frame { frame: 1, expected: 2, found: 1 }), "{refused}");

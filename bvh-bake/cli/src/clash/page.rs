@@ -18,7 +18,7 @@ pub(super) fn page(assembly: &Assembly, found: &[Found<'_>]) -> Result<Page, Fai
             of: Named { name: name_of(&part.file), path: part.file.display().to_string(), shape },
             pose: part.world,
             margin: part.margin,
-            groups: Some(part.groups),
+            groups: part.groups,
             moving: false,
         })
     };

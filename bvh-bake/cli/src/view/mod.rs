@@ -180,7 +180,7 @@ fn scene_page(path: &Path, frames: Option<&Path>, arguments: &ViewArguments) -> 
         refuse_input(output, &sources.iter().map(|(_, path)| path.as_path()).collect::<Vec<_>>())?;
     }
     let poses = frames.into_iter().map(|frame| frame.poses).collect();
-    let frames = Frames { moving, poses, selects_pairs: !is_baked };
+    let frames = Frames { moving, poses };
     let name_of = |id: bvh_query::InstanceId, _: &OwnedShape| {
         // Nothing was removed from the scene, so that the numbers of instances are their places.
         let source = sources.get(id.to_bits() as usize);
