@@ -93,8 +93,10 @@ impl Page {
         max_bytes: u64,
     ) -> PyResult<Self> {
         scene.with_snapshot(py, |state| {
-            let name_of = |id, _: &_| files.get(&state.number(id)).cloned().unwrap_or_default();
-            limited(cbvh_view::Page::of_scene(&state.scene, &Frames::default(), name_of), max_bytes)
+            let number_of = |id| state.number(id);
+            let file_of = |id| files.get(&number_of(id)).cloned().unwrap_or_default();
+            let page = cbvh_view::Page::of_scene(&state.scene, &Frames::default(), file_of, number_of);
+            limited(page, max_bytes)
         })
     }
 

@@ -159,9 +159,7 @@ impl Page {
             length("margin", *margin)?;
         }
         let expected = instances.iter().filter(|instance| instance.moving).count();
-        if let Some((number, frame)) = (1..).zip(&frames).find(|(_, frame)| frame.len() != expected) {
-            return Err(PageError::Frame { frame: number, expected, found: frame.len() });
-        }
+        refuse_frames(&frames, expected)?;
         let pair_margins = pair_margins.into_iter().map(|([a, b], margin)| (a, b, margin)).collect();
         let frames = frames.into_iter().map(Frame).collect();
         let show = Show::Scene { instances, allowed, pair_margins, frames };
@@ -251,6 +249,12 @@ fn instances(placed: impl IntoIterator<Item = Placed>) -> Result<(Files, Vec<Ins
 /// Refuses the number of an instance that is not there.
 fn instance(count: usize, found: usize) -> Result<(), PageError> {
     if found < count { Ok(()) } else { Err(PageError::Instance { count, found }) }
+}
+
+/// Refuses frames with the poses of too few or too many instances.
+pub(crate) fn refuse_frames(frames: &[Vec<Pose>], expected: usize) -> Result<(), PageError> {
+    let wrong = (1..).zip(frames).find(|(_, poses)| poses.len() != expected);
+    wrong.map_or(Ok(()), |(frame, poses)| Err(PageError::Frame { frame, expected, found: poses.len() }))
 }
 
 /// Refuses what is no length. JSON has no way to write what is not finite.

@@ -2,9 +2,10 @@
 
 use crate::PageError;
 use crate::files::Named;
-use crate::page::{Page, Placed};
-use bvh_query::{InstanceId, OwnedShape, Pose, Scene, ScenePair};
+use crate::page::{Page, Placed, refuse_frames};
+use bvh_query::{InstanceId, Pose, Scene, ScenePair};
 use std::collections::HashMap;
+use std::fmt::Display;
 
 /// Which instances of a scene move, and how.
 #[derive(Clone, Debug, Default)]
@@ -16,29 +17,34 @@ pub struct Frames {
 }
 
 impl Page {
-    /// Shows a scene as it is, and frames of those instances that move. `name_of` gives the name and the path of the file of an
-    /// instance. An instance without a name is called `#` and its number.
+    /// Shows a scene as it is, and frames of those instances that move. `file_of` gives the name and the path of the file of an
+    /// instance, and `number_of` the number after the `#` that an instance without a name is called.
     ///
     /// # Errors
-    /// The errors of [`Page::scene`]; [`PageError::Shape`] if the file of a shape is no longer there.
-    pub fn of_scene(
+    /// The errors of [`Page::scene`]; [`PageError::NotInScene`] if what moves is not in the scene; [`PageError::Shape`] if the file
+    /// of a shape is no longer there.
+    pub fn of_scene<N: Display>(
         scene: &Scene,
         frames: &Frames,
-        name_of: impl Fn(InstanceId, &OwnedShape) -> (String, String),
+        file_of: impl Fn(InstanceId) -> (String, String),
+        number_of: impl Fn(InstanceId) -> N,
     ) -> Result<Self, PageError> {
+        for &id in &frames.moving {
+            scene.pose(id)?;
+        }
+        refuse_frames(&frames.poses, frames.moving.len())?;
         let ids: Vec<InstanceId> = scene.instances().collect();
         let places: HashMap<InstanceId, usize> = ids.iter().copied().zip(0..).collect();
-        // The place of each moving instance among those that move, in the order of the instances.
+        // The place of each moving instance in a frame, in the order of the instances. The first counts if it is named twice.
         let mut moving: Vec<(InstanceId, usize)> = frames.moving.iter().copied().zip(0..).collect();
         moving.sort_unstable();
         moving.dedup_by_key(|(id, _)| *id);
         let mut placed = Vec::with_capacity(ids.len());
         for &id in &ids {
-            let shape = scene.shape(id)?.opened()?;
-            let (file_name, path) = name_of(id, &shape);
+            let (name, path) = file_of(id);
             placed.push(Placed {
-                name: scene.name(id)?.map_or_else(|| format!("#{id}"), str::to_owned),
-                of: Named { name: file_name, path, shape },
+                name: scene.name(id)?.map_or_else(|| format!("#{}", number_of(id)), str::to_owned),
+                of: Named { name, path, shape: scene.shape(id)?.opened()? },
                 pose: *scene.pose(id)?,
                 margin: scene.margin(id)?,
                 groups: scene.groups(id)?,

@@ -4,7 +4,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, shapes, to_bytes};
-use bvh_query::{Bvh, ClashClass, Groups, OwnedShape, Pose, Scene};
+use bvh_query::{Bvh, ClashClass, Groups, InstanceId, OwnedShape, Pose, Scene};
 use cbvh_view::{Frames, Named, Page, PageError, Placed, PlacedClash};
 use serde_json::{Value, json};
 use std::io::{self, Read as _, Write};
@@ -200,8 +200,10 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
     scene.set_groups(third, Groups { member: 2, meets: 5 }).unwrap();
     // The third instance is named first.
     let frames = Frames { moving: vec![third, first], poses: vec![vec![shifted(30.0), shifted(10.0)]] };
-    let page = |frames| Page::of_scene(&scene, frames, |_, _| ("block".into(), "block.obj".into())).unwrap();
-    let (content, files) = unpacked(&page(&frames));
+    let page = |frames: &Frames| {
+        Page::of_scene(&scene, frames, |_| ("block".into(), "block.obj".into()), |id| 100 + id.to_bits())
+    };
+    let (content, files) = unpacked(&page(&frames).unwrap());
     assert_eq!(files.len(), 1);
     let at = |x: f64| {
         let mut rows = IDENTITY;
@@ -217,7 +219,7 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
             "kind": "scene",
             "instances": [
                 { "name": "first", "file": 0, "pose": one, "margin": 0.0, "moving": true, "member": all, "meets": all },
-                { "name": "#1", "file": 0, "pose": two, "margin": 0.5, "moving": false, "member": all, "meets": all },
+                { "name": "#101", "file": 0, "pose": two, "margin": 0.5, "moving": false, "member": all, "meets": all },
                 { "name": "third", "file": 0, "pose": three, "margin": 0.0, "moving": true, "member": 2, "meets": 5 },
             ],
             "allowed": [[0, 2]],
@@ -225,9 +227,16 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
             "frames": [frame],
         })
     );
-    let short = Frames { poses: vec![vec![shifted(1.0)]], ..frames };
-    let refused = Page::of_scene(&scene, &short, |_, _| Default::default()).unwrap_err();
-    assert!(matches!(refused, PageError::Frame { frame: 1, expected: 2, found: 1 }), "{refused}");
+    for found in [1, 3] {
+        let wrong = Frames { poses: vec![vec![Pose::IDENTITY; found]], ..frames.clone() };
+        let refused = page(&wrong).unwrap_err();
+        assert!(
+            matches!(refused, PageError::Frame { frame: 1, expected: 2, found: f } if f == found),
+            "{refused}"
+        );
+    }
+    let unknown = Frames { moving: vec![InstanceId::from_bits(9)], ..Frames::default() };
+    assert!(matches!(page(&unknown), Err(PageError::NotInScene(_))));
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::console::{self, Failure, counted, spinner};
 use crate::options::{LayoutArguments, not_negative, positive};
 use crate::process;
 use crate::scene::file::{self as scene, Frame, LoadedScene};
-use bvh_query::{OwnedShape, Pose, ReadAhead};
+use bvh_query::{InstanceId, OwnedShape, Pose, ReadAhead};
 use cbvh_view::{Frames, Named, Page};
 use clap::Args;
 use output::{PageArguments, refuse_input};
@@ -181,7 +181,7 @@ fn scene_page(path: &Path, frames: Option<&Path>, arguments: &ViewArguments) -> 
     }
     let poses = frames.into_iter().map(|frame| frame.poses).collect();
     let frames = Frames { moving, poses };
-    let name_of = |id: bvh_query::InstanceId, _: &OwnedShape| {
+    let file_of = |id: InstanceId| {
         // Nothing was removed from the scene, so that the numbers of instances are their places.
         let source = sources.get(id.to_bits() as usize);
         source.map_or_else(
@@ -189,7 +189,7 @@ fn scene_page(path: &Path, frames: Option<&Path>, arguments: &ViewArguments) -> 
             |(name, path)| (name.clone(), path.display().to_string()),
         )
     };
-    Page::of_scene(&scene, &frames, name_of).map_err(Failure::from_page)
+    Page::of_scene(&scene, &frames, file_of, |id| id).map_err(Failure::from_page)
 }
 
 /// Refuses a frame whose poses the scene refuses, so that the page need not.
