@@ -156,6 +156,7 @@ class View(unittest.TestCase):
                 (ValueError, "motion: expected shape (2, 4, 4)", lambda: view(motion=pose)),
                 (ValueError, "expected one of Motion.between", lambda: view(motion=screw)),
                 (ValueError, "found 2; take one", lambda: view(motion=many)),
+                (ValueError, "half a circle", lambda: view(motion=(pose, np.diag([-1.0, -1, 1, 1])))),
                 (ValueError, "expected no pose", lambda: view(pose=pose, motion=(pose, pose))),
                 (ValueError, "within", lambda: view(within=-1.0)),
                 (ValueError, "clearance", lambda: view(motion=(pose, pose), clearance=np.nan)),

@@ -1,7 +1,7 @@
 //! Why there is no page.
 
 use crate::MAX_FILE_BYTES;
-use bvh_query::{InstanceError, QueryError};
+use bvh_query::{InstanceError, PathError, QueryError};
 
 /// Why a page cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +55,9 @@ pub enum PageError {
         /// The number of poses.
         found: usize,
     },
+    /// No motion leads from one pose to the other.
+    #[error("motion: {0}")]
+    Motion(#[from] PathError),
     /// The file of a shape is not there, or has changed.
     #[error(transparent)]
     Shape(#[from] QueryError),

@@ -8,7 +8,7 @@ use crate::files::{Files, Named, Part};
 use crate::{PageError, json};
 use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
-use bvh_query::{ClashClass, Groups, Pose};
+use bvh_query::{ClashClass, Groups, Motion, Pose};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::{self, BufWriter, Write};
@@ -104,7 +104,8 @@ impl Page {
     /// axis the shorter way. Without B, A moves in its own frame. A tolerance of `None` is that of `bvh_query::MotionOptions`.
     ///
     /// # Errors
-    /// [`PageError::FileTooLarge`], and [`PageError::Number`] for the clearance or the tolerance.
+    /// [`PageError::FileTooLarge`], [`PageError::Motion`] if the poses are half a turn apart, and [`PageError::Number`] for the
+    /// clearance or the tolerance.
     pub fn motion(
         a: Named,
         b: Option<Named>,
@@ -112,6 +113,7 @@ impl Page {
         clearance: f64,
         tolerance: Option<f64>,
     ) -> Result<Self, PageError> {
+        Motion::between(&ends[0], &ends[1])?;
         length("clearance", clearance)?;
         if let Some(found) = tolerance.filter(|tolerance| !(tolerance.is_finite() && *tolerance > 0.0)) {
             return Err(PageError::Number { name: "tolerance", expected: "a finite length above 0", found });

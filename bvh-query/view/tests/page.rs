@@ -291,6 +291,10 @@ fn wrong_numbers_and_sizes_are_refused() {
         assert!(matches!(refused, PageError::Number { name: "margin", .. }), "{refused}");
     }
     assert!(Page::motion(of(), None, [Pose::IDENTITY; 2], 0.0, Some(0.0)).is_err());
+    // No way round is the shorter one.
+    let half_turn = Pose::new([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]).unwrap();
+    let refused = Page::motion(of(), None, [Pose::IDENTITY, half_turn], 0.0, None).unwrap_err();
+    assert!(matches!(refused, PageError::Motion(_)), "{refused}");
     let bytes = block().bytes().len() as u64;
     assert!(Page::file(of()).unwrap().limited_to(bytes).is_ok());
     let refused = Page::file(of()).unwrap().limited_to(bytes - 1).unwrap_err();

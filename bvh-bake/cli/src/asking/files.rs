@@ -210,14 +210,6 @@ pub(crate) fn one_motion(text: &str) -> Result<Motion, Failure> {
     parse_option("--motion", text, A_MOTION, parse_motion)
 }
 
-/// Parses the motion of `--motion`, and returns its ends.
-pub(crate) fn one_motion_ends(text: &str) -> Result<[Pose; 2], Failure> {
-    let ends = parse_option("--motion", text, A_MOTION, parse_ends)?;
-    // Not all ends have a motion between them.
-    Motion::between(&ends[0], &ends[1]).map_err(|error| Failure::Invalid(format!("--motion: {error}")))?;
-    Ok(ends)
-}
-
 /// Parses a pose. Returns `None` if the text is blank.
 pub(crate) fn parse_pose(text: &str) -> Result<Option<Pose>, String> {
     let numbers = numbers(text)?;
@@ -251,12 +243,6 @@ pub(crate) fn parse_placed(text: &str) -> Result<Option<Pose>, String> {
 
 /// Parses a motion. Returns `None` if the text is blank.
 fn parse_motion(text: &str) -> Result<Option<Motion>, String> {
-    let Some([start, end]) = parse_ends(text)? else { return Ok(None) };
-    Motion::between(&start, &end).map(Some).map_err(|error| error.to_string())
-}
-
-/// Parses the two poses of a motion. Returns `None` if the text is blank.
-fn parse_ends(text: &str) -> Result<Option<[Pose; 2]>, String> {
     let words: Vec<&str> = text.split_whitespace().collect();
     if words.is_empty() {
         return Ok(None);
@@ -268,7 +254,8 @@ fn parse_ends(text: &str) -> Result<Option<[Pose; 2]>, String> {
         let pose = parse_pose(&words.join(" ")).map_err(|text| format!("{which}: {text}"))?;
         pose.ok_or_else(|| format!("{which}: {A_MOTION}, found none"))
     };
-    Ok(Some([pose(&words[..POSE_NUMBERS], "start")?, pose(&words[POSE_NUMBERS..], "end")?]))
+    let (start, end) = (pose(&words[..POSE_NUMBERS], "start")?, pose(&words[POSE_NUMBERS..], "end")?);
+    Motion::between(&start, &end).map(Some).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

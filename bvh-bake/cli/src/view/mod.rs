@@ -4,14 +4,14 @@
 mod browser;
 pub(crate) mod output;
 
+use crate::asking;
 use crate::asking::files;
 use crate::asking::mesh::{self, How, LoadedMesh, is_baked, point_out_units};
-use crate::asking::{self};
 use crate::console::{self, Failure, counted, spinner};
 use crate::options::{LayoutArguments, not_negative, positive};
 use crate::process;
 use crate::scene::file::{self as scene, Frame, LoadedScene};
-use bvh_query::{InstanceId, OwnedShape, Pose, ReadAhead};
+use bvh_query::{InstanceId, OwnedShape, Pose, ReadAhead, RigidPath as _};
 use cbvh_view::{Frames, Named, Page};
 use clap::Args;
 use output::{PageArguments, refuse_input};
@@ -114,7 +114,7 @@ fn page(arguments: &ViewArguments) -> Result<Page, Failure> {
         }
     };
     let pose = arguments.pose.as_deref().map(files::one_pose).transpose()?;
-    let motion = arguments.motion.as_deref().map(files::one_motion_ends).transpose()?;
+    let motion = arguments.motion.as_deref().map(files::one_motion).transpose()?;
     let is_alone = path_b.is_none() && pose.is_none() && motion.is_none() && arguments.within.is_none();
     if is_alone && arguments.object.is_none() && is_baked(path_a)? {
         let bvh = process::map(path_a, ReadAhead::Usual)?;
@@ -136,9 +136,9 @@ fn page(arguments: &ViewArguments) -> Result<Page, Failure> {
     let (a, b) = (named(a), b.map(named));
     let made = match motion {
         _ if is_alone => Page::file(a),
-        Some(ends) => {
-            let clearance = arguments.clearance.unwrap_or_default();
-            Page::motion(a, b, ends, clearance, arguments.tolerance)
+        Some(motion) => {
+            let ends = [0.0, 1.0].map(|t| motion.pose(t));
+            Page::motion(a, b, ends, arguments.clearance.unwrap_or_default(), arguments.tolerance)
         }
         None => Page::pair(a, b, &pose.unwrap_or(Pose::IDENTITY), arguments.within),
     };
