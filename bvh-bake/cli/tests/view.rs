@@ -260,7 +260,23 @@ fn clashes_are_about_parts_that_share_files() {
         }
     }
     folder.cbvh("clash --manifest manifest.jsonl --max-page 1MiB").failed(1, &["--max-page requires --view"]);
-    folder.cbvh("clash --manifest manifest.jsonl --view manifest.jsonl").failed(1, &["manifest.jsonl"]);
+    folder.cbvh("clash --manifest manifest.jsonl --view -").failed(1, &["--view: expected a file, found -"]);
+    // An input is no output, whether the command line, the manifest or a folder names it.
+    let baked = std::fs::read(folder.join("cube.cbvh")).unwrap();
+    std::fs::create_dir(folder.join("parts")).unwrap();
+    folder.write("parts/one.cbvh", &baked);
+    folder.write("parts/two.cbvh", &baked);
+    for (inputs, taken) in [
+        ("--manifest manifest.jsonl", "manifest.jsonl"),
+        ("--manifest manifest.jsonl", "cube.cbvh"),
+        ("parts", "parts/two.cbvh"),
+    ] {
+        for option in ["--view", "--csv", "--bcf"] {
+            folder.cbvh(&format!("clash {inputs} {option} ./{taken}")).failed(1, &[taken, "found an input"]);
+        }
+    }
+    assert_eq!(std::fs::read(folder.join("cube.cbvh")).unwrap(), baked);
+    assert_eq!(std::fs::read(folder.join("parts/two.cbvh")).unwrap(), baked);
     let limited = "clash --manifest manifest.jsonl --view other.html --csv other.csv --max-page 1";
     folder.cbvh(limited).failed(4, &["--max-page"]);
     assert!(!folder.join("other.html").exists() && !folder.join("other.csv").exists());
@@ -344,6 +360,8 @@ fn nothing_but_the_page_is_written_or_replaced() {
     folder.write("cell.scene", SCENE);
     to("--scene cell.scene -o cube.cbvh").failed(1, &["cube.cbvh"]);
     to("--scene cell.scene -o cell.scene").failed(1, &["cell.scene"]);
+    // No instance has this shape.
+    to("--scene cell.scene -o cube.obj").failed(1, &["cube.obj"]);
     assert_eq!(std::fs::read(folder.join("cube.cbvh")).unwrap(), baked);
     for name in ["damaged.cbvh", "flipped.cbvh", "cell.scene"] {
         std::fs::remove_file(folder.join(name)).unwrap();

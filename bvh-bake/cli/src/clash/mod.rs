@@ -11,13 +11,13 @@ use crate::asking::{self, files::write_file};
 use crate::console::{self, Failure, Record, counted, csv, record, spinner};
 use crate::options::{Shard, not_negative, threads, whole};
 use crate::process;
-use crate::view::output::{self, PageArguments, refuse_input};
+use crate::view::output::{self, PageArguments, refuse_input, refuse_standard_output};
 use baseline::{Baseline, Old};
 use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, QueryError, SceneError};
 use clap::Args;
 use found::{BY_WEIGHT, Found, Status, both, short};
 use parts::{Assembly, Part};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 const HELP: &str = "\
@@ -157,14 +157,20 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
         return Err(Failure::usage("--max-page requires --view"));
     }
     if let Some(view) = &arguments.view {
-        let inputs = arguments.files.iter().chain(&arguments.manifest).chain(&arguments.baseline);
-        refuse_input(view, &inputs.map(PathBuf::as_path).collect::<Vec<_>>())?;
+        refuse_standard_output("--view", view)?;
     }
+    let inputs = || arguments.files.iter().chain(&arguments.manifest).chain(&arguments.baseline);
+    let outputs = || arguments.view.iter().chain(&arguments.csv).chain(&arguments.bcf);
+    outputs().try_for_each(|output| refuse_input(output, inputs().map(PathBuf::as_path)))?;
     let baseline = arguments.baseline.as_deref().map(Baseline::read).transpose()?;
     let spinner = spinner(false);
     process::remove_unfinished_files(&spinner)?;
     spinner.set_message("reading parts");
     let assembly = Assembly::read(arguments)?;
+    // Folders and manifests name further inputs.
+    let mut files: Vec<&Path> = assembly.parts.iter().map(|part| &*part.file).collect();
+    files.dedup();
+    outputs().try_for_each(|output| refuse_input(output, files.iter().copied()))?;
     let tolerance = arguments.tolerance.unwrap_or_else(|| 1e-6 * assembly.diagonal());
     let options =
         ClashOptions::new().clearance(arguments.clearance).tolerance(tolerance).visits(arguments.visits);

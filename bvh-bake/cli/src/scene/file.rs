@@ -45,6 +45,15 @@ enum Described {
     Cloud(PathBuf, f64),
 }
 
+impl Described {
+    fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Mesh(file) | Self::Cloud(file, _) => Some(file),
+            Self::Core(..) => None,
+        }
+    }
+}
+
 /// How much larger the prism around a cylinder may be, as a fraction of its radius.
 const CYLINDER_ERROR: f64 = 0.002;
 
@@ -56,8 +65,6 @@ pub(crate) struct LoadedScene {
     pub(crate) triangles: u64,
     /// The seconds of baking meshes and opening files.
     pub(crate) build_seconds: f64,
-    /// For each instance of a scene file, in order, the name of its shape and the file that has it.
-    pub(crate) sources: Vec<(String, PathBuf)>,
     /// The number of pairs that were asked about, in all timed frames.
     pub(crate) pairs_asked: u64,
 }
@@ -202,6 +209,17 @@ impl SceneText {
         self.names.push(name.to_owned());
         Ok(())
     }
+
+    /// Returns the files of all shapes that have one.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.shapes.iter().filter_map(Described::file)
+    }
+
+    /// Returns the name of the shape of an instance, and its file if it has one.
+    pub(crate) fn source(&self, instance: usize) -> Option<(&str, Option<&Path>)> {
+        let (_, _, shape, _) = self.instances.get(instance)?;
+        Some((&self.names[*shape], self.shapes[*shape].file()))
+    }
 }
 
 /// Reads a length, which may be 0.
@@ -266,7 +284,6 @@ pub(crate) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure
         moving: scene.instances().collect(),
         scene,
         triangles: triangles_of(bvh.objects()),
-        sources: Vec::new(),
         build_seconds: start.elapsed().as_secs_f64(),
         pairs_asked: 0,
     })
@@ -284,7 +301,6 @@ pub(crate) fn load(
         scene: Scene::with_backend(backend),
         moving: Vec::new(),
         triangles: 0,
-        sources: Vec::new(),
         build_seconds: 0.0,
         pairs_asked: 0,
     };
@@ -326,11 +342,6 @@ pub(crate) fn load(
     for (number, name, mesh, pose) in &text.instances {
         let id = loaded.scene.add_named(name.clone(), shapes[*mesh].clone(), *pose);
         ids.push(id.map_err(|error| Failure::invalid(path, format_args!("line {number}: {error}")))?);
-        let file = match &text.shapes[*mesh] {
-            Described::Mesh(file) | Described::Cloud(file, _) => file,
-            Described::Core(..) => path,
-        };
-        loaded.sources.push((text.names[*mesh].clone(), file.to_owned()));
     }
     // These are instances of the scene.
     let refused = |error| Failure::invalid(path, error);

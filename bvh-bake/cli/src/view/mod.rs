@@ -14,7 +14,7 @@ use crate::scene::file::{self as scene, Frame, LoadedScene};
 use bvh_query::{InstanceId, OwnedShape, Pose, ReadAhead, RigidPath as _};
 use cbvh_view::{Frames, Named, Page};
 use clap::Args;
-use output::{PageArguments, refuse_input};
+use output::{PageArguments, refuse_input, refuse_standard_output};
 use std::path::{Path, PathBuf};
 
 const HELP: &str = "\
@@ -83,7 +83,8 @@ pub(crate) struct ViewArguments {
 pub(crate) fn run(arguments: &ViewArguments) -> Result<(), Failure> {
     let inputs: Vec<&Path> = arguments.files.iter().chain(&arguments.scene).map(PathBuf::as_path).collect();
     if let Some(output) = &arguments.output {
-        refuse_input(output, &inputs)?;
+        refuse_standard_output("-o", output)?;
+        refuse_input(output, inputs.iter().copied())?;
     }
     let spinner = spinner(false);
     process::remove_unfinished_files(&spinner)?;
@@ -159,35 +160,33 @@ fn named(mesh: LoadedMesh) -> Named {
 /// Reads a scene and its frames.
 fn scene_page(path: &Path, frames: Option<&Path>, arguments: &ViewArguments) -> Result<Page, Failure> {
     let backend = asking::backend("auto")?;
-    let is_baked = scene::is_baked_scene(path)?;
-    let (loaded, frames) = if is_baked {
+    let (loaded, frames, text) = if scene::is_baked_scene(path)? {
         let mut loaded = scene::open(path, backend)?;
         if frames.is_none() {
             loaded.moving.clear();
         }
         let read = frames.map(|frames| scene::read_frames(Some(frames), &loaded.names_of_moving()));
-        (loaded, read.transpose()?)
+        (loaded, read.transpose()?, None)
     } else {
         let text = scene::read(path)?;
+        if let Some(output) = &arguments.output {
+            refuse_input(output, text.files())?;
+        }
         // Without frames, what may move stands where the file says.
         let read = frames.map(|frames| scene::read_frames(Some(frames), &text.moving)).transpose()?;
-        (scene::load(path, &text, &arguments.layout, backend)?, read)
+        (scene::load(path, &text, &arguments.layout, backend)?, read, Some(text))
     };
     let frames = frames.unwrap_or_default();
     try_all(&loaded, &frames, arguments.scene.last().map_or(path, PathBuf::as_path))?;
-    let LoadedScene { scene, moving, sources, .. } = loaded;
-    if let Some(output) = &arguments.output {
-        refuse_input(output, &sources.iter().map(|(_, path)| path.as_path()).collect::<Vec<_>>())?;
-    }
+    let LoadedScene { scene, moving, .. } = loaded;
     let poses = frames.into_iter().map(|frame| frame.poses).collect();
     let frames = Frames { moving, poses };
     let file_of = |id: InstanceId| {
         // Nothing was removed from the scene, so that the numbers of instances are their places.
-        let source = sources.get(id.to_bits() as usize);
-        source.map_or_else(
-            || (output::name_of(path), path.display().to_string()),
-            |(name, path)| (name.clone(), path.display().to_string()),
-        )
+        let source = text.as_ref().and_then(|text| text.source(id.to_bits() as usize));
+        let (name, file) =
+            source.map_or_else(|| (output::name_of(path), None), |(name, file)| (name.to_owned(), file));
+        (name, file.unwrap_or(path).display().to_string())
     };
     Page::of_scene(&scene, &frames, file_of, |id| id).map_err(Failure::from_page)
 }

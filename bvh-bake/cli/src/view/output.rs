@@ -51,15 +51,25 @@ pub(crate) fn write(page: &Page, path: &Path) -> Result<(), Failure> {
     written.map_err(|error| Failure::from_bake(path.display(), &error))
 }
 
-/// Refuses an output that is an input, which the page would replace.
-pub(crate) fn refuse_input(output: &Path, inputs: &[&Path]) -> Result<(), Failure> {
-    if output == Path::new("-") {
-        let what = "-o: expected a file, found -; a page appears whole or not at all, so it cannot be standard output (write ./- \
-                    for a file of this name)";
-        return Err(Failure::Usage(what.into()));
+/// Refuses a page that the option calls `-`.
+pub(crate) fn refuse_standard_output(option: &str, output: &Path) -> Result<(), Failure> {
+    if output != Path::new("-") {
+        return Ok(());
     }
+    Err(Failure::Usage(format!(
+        "{option}: expected a file, found -; a page appears whole or not at all, so it cannot be standard output (write ./- for a \
+         file of this name)"
+    )))
+}
+
+/// Refuses an output that is an input, which it would replace.
+pub(crate) fn refuse_input<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
     let Ok(existing) = std::fs::canonicalize(output) else { return Ok(()) };
-    if inputs.iter().any(|input| std::fs::canonicalize(input).is_ok_and(|input| input == existing)) {
+    let is_output = |input| std::fs::canonicalize(input).is_ok_and(|input| input == existing);
+    if inputs.into_iter().any(is_output) {
         let refused = BakeError::OutputIsInput { path: output.to_owned() };
         return Err(Failure::from_bake(output.display(), &refused));
     }
