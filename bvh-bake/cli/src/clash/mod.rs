@@ -171,6 +171,10 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
     let mut files: Vec<&Path> = assembly.parts.iter().map(|part| &*part.file).collect();
     files.dedup();
     outputs().try_for_each(|output| refuse_input(output, files.iter().copied()))?;
+    if arguments.view.is_some() {
+        // Clashes do not count: a page that is too large is refused before parts are asked about.
+        arguments.page.limit(page::page(&assembly, &[])?)?;
+    }
     let tolerance = arguments.tolerance.unwrap_or_else(|| 1e-6 * assembly.diagonal());
     let options =
         ClashOptions::new().clearance(arguments.clearance).tolerance(tolerance).visits(arguments.visits);
@@ -217,10 +221,7 @@ fn blame(
     let SceneError::Pair { a, b, source } = error else { return Failure::usage(error) };
     let parts = [&a, &b].map(|label| &assembly.parts[part_of(label.id)]);
     let at_fault = match &source {
-        QueryError::File { found: FileChange::Unreadable(_), .. } => {
-            return Failure::System(source.to_string());
-        }
-        QueryError::File { .. } => return Failure::Invalid(source.to_string()),
+        QueryError::File { .. } => return of_file(&source),
         _ => {
             // The error does not say which part it is about.
             let is_damaged = |part: &&Part| part.shape.opened().is_ok_and(|of| of.bvh().validate().is_err());
@@ -228,6 +229,14 @@ fn blame(
         }
     };
     Failure::invalid(&at_fault.file, format_args!("part {:?}: {source}", at_fault.name))
+}
+
+/// Classifies an error about a file that was opened again.
+fn of_file(error: &QueryError) -> Failure {
+    match error {
+        QueryError::File { found: FileChange::Unreadable(_), .. } => Failure::System(error.to_string()),
+        _ => Failure::Invalid(error.to_string()),
+    }
 }
 
 /// All that is known at the end.
@@ -243,17 +252,14 @@ struct Answer<'a> {
 
 impl Answer<'_> {
     fn write_files(&self) -> Result<(), Failure> {
-        let ClashArguments { view, page: limits, .. } = self.arguments;
-        // A page that is too large is refused before anything is written.
-        let page =
-            view.as_ref().map(|_| limits.limit(page::page(self.assembly, &self.found)?)).transpose()?;
-        if let Some((path, page)) = view.as_deref().zip(page) {
-            output::write(&page, path)?;
+        let ClashArguments { view, csv, bcf, .. } = self.arguments;
+        if let Some(path) = view {
+            output::write(&page::page(self.assembly, &self.found)?, path)?;
         }
-        if let Some(path) = &self.arguments.csv {
+        if let Some(path) = csv {
             write_file(path, &self.csv())?;
         }
-        if let Some(path) = &self.arguments.bcf {
+        if let Some(path) = bcf {
             let bytes = bcf::archive(path, self.assembly, &self.found)?;
             let written = bvh_bake::write_atomically(path, &bytes);
             written.map_err(|error| Failure::from_bake(path.display(), &error))?;

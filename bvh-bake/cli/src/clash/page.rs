@@ -1,6 +1,7 @@
 //! The page of an assembly: all parts where they stand, and the clashes in their order.
 
 use super::found::Found;
+use super::of_file;
 use super::parts::{Assembly, Part};
 use crate::console::Failure;
 use crate::view::output::name_of;
@@ -9,10 +10,7 @@ use cbvh_view::{Named, Page, Placed, PlacedClash};
 /// Returns the page. Parts whose meshes are one file share it.
 pub(super) fn page(assembly: &Assembly, found: &[Found<'_>]) -> Result<Page, Failure> {
     let placed = |part: &Part| {
-        let shape = part
-            .shape
-            .opened()
-            .map_err(|error| Failure::invalid(&part.file, format_args!("part {:?}: {error}", part.name)))?;
+        let shape = part.shape.opened().map_err(|error| of_file(&error))?;
         Ok(Placed {
             name: part.name.clone(),
             of: Named { name: name_of(&part.file), path: part.file.display().to_string(), shape },

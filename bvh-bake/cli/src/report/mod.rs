@@ -201,8 +201,8 @@ fn run_kind<T: Clone>(
         let mut measured = (kind.measure)(&subject, &items)?;
         if let Some(pose) = &measured.seen {
             let [a, b] = subject.named();
-            let page = Page::pair(a, Some(b), pose, None).map_err(Failure::from_page)?;
-            measured.view = page.limited_to(MAX_VIEW_BYTES).ok();
+            let page = Page::pair(a, Some(b), pose, None);
+            measured.view = page.and_then(|page| page.limited_to(MAX_VIEW_BYTES)).ok();
         }
         report.add(&subject, measured, (kind.items, items.len(), &from));
     }
@@ -244,7 +244,7 @@ impl Report {
     fn add(&mut self, subject: &Subject<'_>, mut of: Measured, (items, count, from): (&str, usize, &str)) {
         let Subject { pair, baked, .. } = subject;
         let side = |path: &Path, (bvh, report): &Baked| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let name = name_of(path);
             let (triangles, diagonal) = (bvh.all().triangles(), made::diagonal(bvh));
             let layout = layout_of(report);
             (
