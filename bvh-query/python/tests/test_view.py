@@ -6,6 +6,7 @@ import html.parser
 import json
 import os
 import pathlib
+import sys
 import tempfile
 import unittest
 import unittest.mock
@@ -118,6 +119,19 @@ class View(unittest.TestCase):
             pages = ["again.html", "page.html", "scene.html", "small.cbvh"]
             self.assertEqual(sorted(os.listdir(place)), pages)
 
+    @unittest.skipUnless(sys.platform == "linux", "other systems have no such names")
+    def test_names_that_are_no_utf_8(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.fsdecode(os.fsencode(folder) + b"/small\xff.cbvh")
+            self.small.save(path)
+            mesh, scene = cbvh.open(path), cbvh.Scene()
+            scene.add(mesh)
+            for view in mesh.view(), scene.view():
+                said, files = content(view.html())
+                self.assertEqual((said["files"][0]["name"], files), ("small\ufffd.cbvh", [self.small.tobytes()]))
+            mesh.view(path=os.fsdecode(os.fsencode(folder) + b"/page\xff.html"))
+            self.assertEqual(sorted(os.listdir(os.fsencode(folder))), [b"page\xff.html", b"small\xff.cbvh"])
+
     def test_notebook(self):
         class Frames(html.parser.HTMLParser):
             found = []
@@ -160,6 +174,8 @@ class View(unittest.TestCase):
                 (ValueError, "expected no pose", lambda: view(pose=pose, motion=(pose, pose))),
                 (ValueError, "within", lambda: view(within=-1.0)),
                 (ValueError, "clearance", lambda: view(motion=(pose, pose), clearance=np.nan)),
+                (ValueError, "expected a motion", lambda: view(self.large, clearance=0.5)),
+                (ValueError, "expected a motion", lambda: view(tolerance=1e-3)),
                 (ValueError, "max_bytes", lambda: view(max_bytes=10)),
                 (ValueError, "max_bytes", lambda: view(max_bytes=-1)),
                 (TypeError, "max_bytes", lambda: view(max_bytes="many")),

@@ -208,9 +208,9 @@ class Mesh:
         """A page that shows this mesh, this mesh and another one, or a motion of the other one. A notebook shows it at once.
 
         ``pose``: of ``other`` in the frame of this mesh (body to world), shape (4, 4); None is the identity. ``motion``: one
-        `Motion.between`, or its first and last pose, shape (2, 4, 4). If one of both is given and ``other`` is not, this mesh
-        is shown twice. ``within`` also shows whether they are at most that far apart. ``clearance`` and ``tolerance`` are
-        those of `motion`. ``path``: where to save the page. `View.save` saves it later, and `View.open` shows it in the browser.
+        `Motion.between`, or its first and last pose, shape (2, 4, 4). ``within`` also shows whether both meshes are at most that
+        far apart. If one of these is given and ``other`` is not, this mesh is shown twice. ``clearance`` and ``tolerance`` are
+        those of `motion`, and need one. ``path``: where to save the page. `View.save` saves it later, and `View.open` shows it in the browser.
 
         The page is one HTML file with the meshes in it. ValueError if they have more than ``max_bytes``, by default 256 MiB.
         """
@@ -222,6 +222,8 @@ class Mesh:
                 raise ValueError("motion: expected no pose or within beside it")
             ends = motion._ends() if isinstance(motion, Motion) else motion
             return show(_cbvh.Page.motion(a, b, ends, clearance, tolerance, most), path)
+        if clearance != 0 or tolerance is not None:
+            raise ValueError("clearance and tolerance: expected a motion beside them, found none")
         if other is None and pose is None and within is None:
             return show(_cbvh.Page.file(a, most), path)
         return show(_cbvh.Page.pair(a, b, pose, within, most), path)

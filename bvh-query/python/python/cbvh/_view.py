@@ -47,7 +47,8 @@ class View:
     def open(self) -> str:
         """Writes the page to a new folder in the system's temporary folder, opens it in the browser, and returns its path.
 
-        Nobody removes the page afterwards. A browser that may not read that folder needs `save`.
+        Nobody removes the page afterwards. Where there is no browser, the page is written nevertheless. A browser that may not
+        read that folder needs `save`.
         """
         path = os.path.join(tempfile.mkdtemp(prefix="cbvh-view-"), "view.html")
         try:
@@ -69,8 +70,11 @@ class View:
 
 
 def called(path: str | None) -> tuple[str, str]:
-    """The name and the path of the file of a mesh."""
-    return ("mesh", "") if path is None else (os.path.basename(path), path)
+    """The name and the path of the file of a mesh, as a page can have them: bytes that are no UTF-8 become U+FFFD."""
+    if path is None:
+        return "mesh", ""
+    path = os.fsencode(path).decode(errors="replace")
+    return os.path.basename(path), path
 
 
 def show(page: _cbvh.Page, path: str | os.PathLike[str] | None) -> View:
