@@ -12,7 +12,7 @@ use js_sys::{Array, Float64Array};
 use std::collections::BTreeMap;
 use wasm_bindgen::prelude::*;
 
-/// The most steps that are recorded: 64 MB of them.
+/// The most steps that are recorded: 84 MB of them.
 const MAX_STEPS: usize = 1 << 22;
 
 /// How often something was met, by page, and slot or packet.
@@ -31,7 +31,9 @@ struct Side<'a> {
 
 impl Side<'_> {
     fn start(&mut self, first_page: u32) {
-        self.object = self.bvh.objects().iter().find(|object| object.pages().start == first_page);
+        let objects = self.bvh.objects();
+        let place = objects.binary_search_by_key(&first_page, |object| object.pages().start);
+        self.object = place.ok().and_then(|place| objects.get(place));
         self.nodes.clear();
     }
 
