@@ -3,7 +3,7 @@
 mod common;
 
 use common::documents::{
-    elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
+    elements, fetches_nothing, number, pose_shown, report_files, same_figures, same_figures_in_page,
 };
 use common::{Files as _, place};
 use common::{cbvh_in, poses, torus};
@@ -25,7 +25,8 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let directory = &place();
     directory.write("torus.obj", torus(24, 12));
     directory.cbvh("bake torus.obj -o torus.cbvh --no-ids").done();
-    directory.write("p.txt", poses(8, 0.0, 6.0));
+    // The first of them are apart.
+    directory.write("p.txt", poses(8, 6.0, 0.0));
     for mesh in ["fclenv.obj", "fclrob.obj"] {
         fs::copy(Path::new(TESTDATA).join(mesh), directory.join(mesh)).unwrap();
     }
@@ -35,6 +36,15 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     let ended = report(directory, &["pairs.txt", "--out", "new/out", "--quick"]);
     assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
     let [csv, html, json, svg] = report_files(directory, "new/out");
+    // The second page shows the first pose in which the tori touch.
+    let asked = directory.cbvh("query torus.cbvh torus.cbvh p.txt --mode collide").done().out;
+    let touching = asked.lines().position(|line| line == "1").unwrap();
+    assert!(touching > 0, "{asked}");
+    let all = directory.text("p.txt");
+    let pose = all.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).nth(touching).unwrap();
+    let numbers =
+        |text: &str| text.split_whitespace().take(12).map(|x| x.parse().unwrap()).collect::<Vec<f64>>();
+    assert_eq!(numbers(&pose_shown(&directory.text("new/out/view-2.html"))), numbers(pose));
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
     let rows = json["rows"].as_array().unwrap();

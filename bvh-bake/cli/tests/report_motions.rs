@@ -3,10 +3,10 @@
 mod common;
 
 use common::documents::{
-    elements, fetches_nothing, number, report_files, same_figures, same_figures_in_page,
+    elements, fetches_nothing, number, pose_shown, report_files, same_figures, same_figures_in_page,
 };
 use common::torus;
-use common::{Files as _, place};
+use common::{Files as _, cbvh_in, place};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -29,6 +29,10 @@ fn four_files_hold_the_same_figures_and_no_answer_contradicts_another() {
     directory.write("pairs.txt", list);
     let said = directory.cbvh("report pairs.txt --motions --out out --quick").done().out;
     let [csv, html, json, svg] = report_files(directory, "out");
+    // The second page shows where the only hit touches.
+    let pose = pose_shown(&directory.text("out/view-2.html"));
+    let asked = ["query", "torus.obj", "torus.obj", "--mode", "collide", "--pose", &pose];
+    assert!(cbvh_in(directory, &asked).done().out.starts_with("the meshes touch"));
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["wrong"].as_array().unwrap().len(), 0);
     let rows = json["rows"].as_array().unwrap();

@@ -94,14 +94,17 @@ pub(crate) fn same_figures_in_page(page: &[Element], rows: &[Value]) -> usize {
     shown
 }
 
-/// Returns the four files: table, page, JSON and drawing.
+/// Returns the four files: table, page, JSON and drawing. Two pairs were small enough to be shown.
 pub(crate) fn report_files(directory: &Path, out: &str) -> [String; 4] {
     let out = directory.join(out);
     let (reports, views): (Vec<String>, Vec<String>) =
         names(&out).into_iter().partition(|name| name.starts_with("report."));
     assert_eq!(reports, ["report.csv", "report.html", "report.json", "report.svg"]);
     let page = fs::read_to_string(out.join("report.html")).unwrap();
-    assert_eq!(page.matches("See the pair").count(), views.len());
+    assert_eq!(
+        (page.matches("See the pair").count(), &views[..]),
+        (2, &["view-1.html", "view-2.html"].map(str::to_owned)[..])
+    );
     for view in views {
         assert!(page.contains(&format!("<a href=\"{view}\">")), "{view}");
         let shown = fs::read_to_string(out.join(&view)).unwrap();
@@ -114,6 +117,16 @@ pub(crate) fn report_files(directory: &Path, out: &str) -> [String; 4] {
         assert!(!text.contains(directory.to_str().unwrap()), "a path of this machine");
     }
     files
+}
+
+/// Returns the pose in which a page shows a pair, as `--pose` takes it.
+#[track_caller]
+pub(crate) fn pose_shown(page: &str) -> String {
+    let (_, content) = page.split_once("id=\"cbvh-content\">").unwrap();
+    let content: Value = serde_json::from_str(content.split_once("</script>").unwrap().0).unwrap();
+    assert_eq!(content["show"]["kind"], "pair");
+    let numbers = content["show"]["pose"].as_array().unwrap();
+    numbers.iter().map(Value::to_string).collect::<Vec<_>>().join(" ")
 }
 
 /// Asserts that a page fetches nothing from elsewhere.

@@ -303,8 +303,9 @@ class Robot:
     def first_hit(
         self, path: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None, parallel: bool = False
     ) -> tuple[int, RobotMotion] | None:
-        """What touches first on the straight motions through the rows of ``path``: the number of the motion, from 0, and
-        its answer; None if the whole path is free. See `is_free`, which also tells whether each motion is free."""
+        """The first of the straight motions through the rows of ``path`` that is not free: its number, from 0, and its answer,
+        which says what touches or comes near, and when. None if all are free. See `motion` for the answer, and `is_free` to learn
+        of each motion whether it is free."""
         rows, _ = self._rows(path, "path")
         keys: dict[str, Any] = {"clearance": clearance, "tolerance": tolerance}
         for number in np.flatnonzero(~self.is_free(rows[:-1], rows[1:], parallel=parallel, **keys)).tolist():
