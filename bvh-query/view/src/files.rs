@@ -89,9 +89,10 @@ impl Files {
         Ok((number, part))
     }
 
-    /// Adds a file again, which is then shown twice.
-    pub(crate) fn repeat(&mut self, number: usize) {
-        self.list.extend(self.list.get(number).cloned());
+    /// Adds a file again under another name or the same one. The page then has it twice.
+    pub(crate) fn repeat(&mut self, number: usize, name: String, path: String) {
+        let again = self.list.get(number).map(|file| File { name, path, ..file.clone() });
+        self.list.extend(again);
     }
 
     /// Returns the bytes of all files before they are packed.
@@ -101,6 +102,11 @@ impl Files {
 }
 
 impl File {
+    /// Returns whether the file is called this.
+    pub(crate) fn is_called(&self, name: &str, path: &str) -> bool {
+        self.name == name && self.path == path
+    }
+
     /// Returns what the page says about the file.
     pub(crate) fn entry(&self, part: Part) -> Entry<'_> {
         Entry { name: &self.name, path: &self.path, bytes: self.bytes, part }

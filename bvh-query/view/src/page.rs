@@ -127,12 +127,13 @@ impl Page {
         let mut parts = vec![files.add(a)?.1];
         let mut same = b.is_none();
         if let Some(b) = b {
+            let (name, path) = (b.name.clone(), b.path.clone());
             let (number, part) = files.add(b)?;
-            // A page of two objects of one file has the file twice.
-            same = number == 0 && part == parts[0];
+            same = number == 0 && part == parts[0] && files.list[0].is_called(&name, &path);
             if !same {
+                // A page of two objects of one file, or of two files with the same bytes, has these bytes twice.
                 if number == 0 {
-                    files.repeat(0);
+                    files.repeat(0, name, path);
                 }
                 parts.push(part);
             }

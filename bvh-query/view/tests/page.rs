@@ -185,6 +185,14 @@ fn a_file_is_in_the_page_once() {
     assert_eq!(files, [both.bytes(), both.bytes()]);
     assert_eq!((&content["files"][0]["object"], &content["files"][1]["object"]), (&0.into(), &1.into()));
     assert_eq!(content["show"]["same"], none);
+    // A copy of a file keeps its name.
+    for (name, count) in [("x", 1), ("copy of x", 2)] {
+        let copy = Bvh::from_bytes(block.bytes().to_vec()).unwrap();
+        let page =
+            Page::pair(named("x", block.clone()), Some(named(name, copy)), &Pose::IDENTITY, None).unwrap();
+        let (content, files) = unpacked(&page);
+        assert_eq!((files.len(), &content["files"][count - 1]["name"]), (count, &name.into()));
+    }
 }
 
 #[test]
