@@ -6,7 +6,7 @@ use crate::errors::{bake_error, query_error};
 use crate::mesh::Mesh;
 use crate::scene::Scene;
 use bvh_bake::write_atomically_with;
-use cbvh_view::{Frames, Named, PageError};
+use cbvh_view::{DEFAULT_MAX_BYTES, Frames, Named, PageError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -37,16 +37,17 @@ fn page_error(error: PageError) -> PyErr {
     }
 }
 
-/// Returns a page of at most so many bytes of files.
-fn limited(page: Result<cbvh_view::Page, PageError>, max_bytes: u64) -> PyResult<Page> {
-    page.and_then(|page| page.limited_to(max_bytes)).map(Page).map_err(page_error)
+/// Returns a page of at most so many bytes of files, or of as many as most browsers show.
+fn limited(page: Result<cbvh_view::Page, PageError>, max_bytes: Option<u64>) -> PyResult<Page> {
+    let limit = max_bytes.unwrap_or(DEFAULT_MAX_BYTES);
+    page.and_then(|page| page.limited_to(limit)).map(Page).map_err(page_error)
 }
 
 #[pymethods]
 impl Page {
     /// One mesh alone.
     #[staticmethod]
-    fn file(a: Shown<'_>, max_bytes: u64) -> PyResult<Self> {
+    fn file(a: Shown<'_>, max_bytes: Option<u64>) -> PyResult<Self> {
         limited(cbvh_view::Page::file(named(a)), max_bytes)
     }
 
@@ -57,7 +58,7 @@ impl Page {
         b: Option<Shown<'_>>,
         pose: Option<&Bound<'_, PyAny>>,
         within: Option<&Bound<'_, PyAny>>,
-        max_bytes: u64,
+        max_bytes: Option<u64>,
     ) -> PyResult<Self> {
         let pose = pose_or_identity(pose, "pose")?;
         let within = within.map(|within| number(within, "within")).transpose()?;
@@ -72,7 +73,7 @@ impl Page {
         ends: &Bound<'_, PyAny>,
         clearance: &Bound<'_, PyAny>,
         tolerance: Option<&Bound<'_, PyAny>>,
-        max_bytes: u64,
+        max_bytes: Option<u64>,
     ) -> PyResult<Self> {
         let read = poses(ends, "motion")?;
         let [start, end] = read.rows[..] else {
@@ -90,7 +91,7 @@ impl Page {
         py: Python<'_>,
         scene: &Scene,
         files: HashMap<i64, (String, String)>,
-        max_bytes: u64,
+        max_bytes: Option<u64>,
     ) -> PyResult<Self> {
         scene.with_snapshot(py, |state| {
             let number_of = |id| state.number(id);

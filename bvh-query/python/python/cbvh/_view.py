@@ -11,8 +11,6 @@ from typing import Any
 
 from . import _cbvh
 
-#: The most bytes of meshes in a page, unless ``max_bytes`` says otherwise. A browser needs about five times as much memory.
-MAX_BYTES = 256 << 20
 #: The most characters of a page that a notebook is asked to hold in a cell.
 MAX_CELL = 64 << 20
 
@@ -85,10 +83,10 @@ def show(page: _cbvh.Page, path: str | os.PathLike[str] | None) -> View:
     return view
 
 
-def limit(max_bytes: Any) -> int:
-    """The most bytes of meshes in a page."""
+def limit(max_bytes: Any) -> int | None:
+    """The most bytes of meshes in a page; None leaves that to the library."""
     if max_bytes is None:
-        return MAX_BYTES
+        return None
     try:
         most = operator.index(max_bytes)
     except TypeError:
