@@ -1,6 +1,7 @@
 //! What a page shows, as it says so in JSON.
 
 use crate::files::{Entry, Part};
+use crate::json::is_false;
 use bvh_query::{ClashClass, Pose};
 use serde::{Serialize, Serializer};
 
@@ -91,11 +92,6 @@ pub(crate) struct Found {
     pub(crate) point: [f64; 3],
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) translation: Option<[f64; 3]>,
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
-pub(crate) fn is_false(flag: &bool) -> bool {
-    !flag
 }
 
 /// Returns the rows of the 3 by 4 matrix of a pose.

@@ -1,6 +1,6 @@
 //! The files that a page embeds, each once, whichever shapes use it.
 
-use crate::content::is_false;
+use crate::json::is_false;
 use crate::{MAX_FILE_BYTES, PageError};
 use bvh_query::{OwnedShape, QueryError};
 use serde::Serialize;

@@ -9,6 +9,12 @@ pub(crate) fn write(value: &impl Serialize, out: impl Write) -> io::Result<()> {
     value.serialize(&mut Serializer::with_formatter(out, ForScript)).map_err(io::Error::from)
 }
 
+/// Returns whether a flag is left out.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
+pub(crate) fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
 /// Writes compact JSON, and escapes more than JSON asks for.
 struct ForScript;
 

@@ -14,8 +14,9 @@ export interface ContentInstance extends ContentPart {
     pose: Numbers12;
     margin: number;
     moving: boolean;
-    member?: number;
-    meets?: number;
+    /** The groups that it is in, and those that it meets, as bits. */
+    member: number;
+    meets: number;
 }
 
 export interface ContentClash {

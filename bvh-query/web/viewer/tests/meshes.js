@@ -52,7 +52,11 @@ export function overlaps(count) {
 /** A ring that stands, and two boxes, one of which moves through the ring in three frames. */
 export function scene() {
     const at = (x, y, z) => [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z];
-    const instance = (name, file, pose, moving) => ({ name, file, pose, margin: 0, moving });
+    // What moves is in group 2 and meets all, what stands is in group 1 and meets what moves.
+    const instance = (name, file, pose, moving) => {
+        const groups = moving ? { member: 2, meets: 3 } : { member: 1, meets: 2 };
+        return { name, file, pose, margin: 0, moving, ...groups };
+    };
     return {
         kind: "scene",
         instances: [

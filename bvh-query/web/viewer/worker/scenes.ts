@@ -10,9 +10,8 @@ export interface PlacedInstance {
     pose: Float64Array;
     margin: number;
     moving: boolean;
-    /** The groups of the instance, unless they follow from what moves. */
-    member?: number;
-    meets?: number;
+    member: number;
+    meets: number;
 }
 
 /** What is shown of a frame. */
@@ -24,7 +23,6 @@ export interface FrameAnswer {
     took: number;
 }
 
-const [STILL, MOVING] = [1, 2];
 let scene: Scene | undefined;
 
 function current(): Scene {
@@ -34,7 +32,7 @@ function current(): Scene {
     return scene;
 }
 
-/** Makes the scene. Asked are all pairs in which an instance moves, or all if none does, unless groups say otherwise. */
+/** Makes the scene. Groups select the pairs that are asked about. */
 export function make(
     instances: PlacedInstance[],
     allowed: [number, number][],
@@ -42,13 +40,8 @@ export function make(
 ): void {
     scene?.free();
     scene = new Scene();
-    const anyMoves = instances.some((instance) => instance.moving);
-    for (const { file: number, pose, margin, moving, member, meets } of instances) {
-        const added = scene.add(file(number).mesh, pose, {
-            member: member ?? (moving ? MOVING : STILL),
-            meets: meets ?? (moving || !anyMoves ? MOVING | STILL : MOVING),
-        });
-        scene.setMargin(added, margin);
+    for (const { file: number, pose, margin, member, meets } of instances) {
+        scene.setMargin(scene.add(file(number).mesh, pose, { member, meets }), margin);
     }
     for (const [a, b] of allowed) {
         scene.setAllowed(a, b);
