@@ -158,7 +158,9 @@ impl Ray {
     #[inline(never)]
     fn exact_crossing_of_plane(&self, triangle: &Triangle, feature: Feature) -> Option<Crossing> {
         let t = self.parameter_of_plane(triangle);
-        (t.numerator.sign() != Sign::Minus).then(|| t.crossing(feature))
+        // Only where a damaged file has corners that are not finite, the signs of the sides and of the slope disagree.
+        let is_number = t.denominator != BigInt::ZERO;
+        (is_number && t.numerator.sign() != Sign::Minus).then(|| t.crossing(feature))
     }
 
     /// Returns the exact parameter at which the line meets the plane of a triangle with area that is not parallel to it.

@@ -4,6 +4,7 @@ mod distance;
 mod generate;
 mod intersect;
 mod many;
+mod ray;
 mod region;
 mod stretch;
 mod within;
