@@ -101,6 +101,21 @@ fn walks_with_jumps_in_all_profiles_and_encodings_on_all_backends() {
     }
 }
 
+/// Whether a solid is inside another one is asked after the tracker has looked ahead.
+#[test]
+fn walks_of_solids_around_and_into_each_other() {
+    let mut random = Random::new(6);
+    for querier in &mut queriers() {
+        let bowl = bake(&mesh(&torus(48, 32)), &options(Profile::Dop14U8, TriangleEncoding::Packed));
+        let ball = bake(&mesh(&sphere(3)), &options(Profile::Dop14U8, TriangleEncoding::Packed));
+        let (bowl, ball) = (bowl.all().solid().unwrap(), ball.all().solid().unwrap());
+        let mut trackers = Trackers::default();
+        for (step, pose) in walk(&mut random, 400).iter().enumerate() {
+            trackers.check(querier, bowl, ball, pose, &format!("{} {step}", querier.backend()));
+        }
+    }
+}
+
 #[test]
 fn down_to_contact_along_it_and_through() {
     let mut poses = Vec::new();

@@ -274,7 +274,8 @@ impl Tracker {
     }
 
     /// Asks whether meshes that are more than `beyond` apart have room for several more motions as long as the last
-    /// one, `moved`. This takes at most as many visits as the query did, and its errors do not matter.
+    /// one, `moved`. This takes at most as many visits as the query did, and its errors do not matter: what the query asks after
+    /// that has the rest of its budget.
     fn look_ahead(
         &mut self,
         querier: &mut Querier,
@@ -290,8 +291,11 @@ impl Tracker {
         }
         let room = beyond + LOOK_AHEAD_MOTIONS * moved;
         let mut search = Search::new(DistanceOptions::default(), room);
+        let budget = querier.memory.budget;
         querier.memory.budget.allow_as_much_again();
-        if querier.search(a, b, pose, &mut search).is_ok() && !search.done {
+        let found = querier.search(a, b, pose, &mut search);
+        querier.memory.budget = budget.after(querier.memory.budget.made());
+        if found.is_ok() && !search.done {
             self.bounds = Some(DistanceBounds { pose: *pose, lower: room, upper: f64::INFINITY });
             self.waited = 0;
         } else {

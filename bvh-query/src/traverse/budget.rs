@@ -37,6 +37,11 @@ impl Budget {
         self.given - self.left
     }
 
+    /// Returns this budget after some visits were made, at most those given.
+    pub(crate) fn after(self, made: u64) -> Self {
+        Self { left: self.given.saturating_sub(made), ..self }
+    }
+
     /// Lets what follows make as many visits as have been made and a few more, but none beyond the budget.
     pub(crate) fn allow_as_much_again(&mut self) {
         let made = self.made();
