@@ -1,7 +1,7 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
 //! Each of these modules does one thing that a person does with the command: `bake` one output, or many `assets`;
-//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `clash`; `view`; `report`. They import these modules, which do not import them:
+//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `clash`; `view`; `suite`; `report`. They import these modules, which do not import them:
 //! `asking` (the common part of commands that ask questions), `options` (options of several commands), `process`
 //! (memory, mapped files and signals) and `console` (output and exit codes). `cbvh --help` and the help of each
 //! command state what scripts may rely on.
@@ -20,6 +20,7 @@ mod process;
 mod query;
 mod report;
 mod scene;
+mod suite;
 mod view;
 
 use clap::error::ErrorKind;
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Command::Scene(arguments) => scene::run(&arguments),
         Command::Clash(arguments) => clash::run(&arguments),
         Command::View(arguments) => view::run(&arguments),
+        Command::Suite(arguments) => suite::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
     });
     match result {
@@ -84,6 +86,8 @@ enum Command {
     Clash(clash::ClashArguments),
     /// Write a page that shows meshes, a motion or a scene in a browser, and asks cbvh there
     View(view::ViewArguments),
+    /// Answer the questions of the public suite (spec/suite), one line in and one line out
+    Suite(suite::SuiteArguments),
     /// Measure speed against error on your own meshes: for each layout, or for ways to ask about motions
     Report(report::ReportArguments),
 }
@@ -96,7 +100,7 @@ fn failure(error: &clap::Error) -> Failure {
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(
-            "expected a command: bake, dump, validate, verify, query, motion, probe, scene, clash, view or report (see cbvh --help)"
+            "expected a command: bake, dump, validate, verify, query, motion, probe, scene, clash, view, suite or report (see cbvh --help)"
                 .into(),
         );
     }

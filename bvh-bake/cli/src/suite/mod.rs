@@ -1,0 +1,142 @@
+//! `cbvh suite`: answers the questions of the public suite, one line in, one line out.
+//!
+//! `spec/suite/PROTOCOL.md` defines the lines. [`message`] reads them, [`meshes`] keeps the meshes that were sent, and
+//! [`ask`] puts each question to bvh-query. A line that cannot be answered gets a refusal with its reason, and the command
+//! goes on with the next line. It ends with its input.
+
+mod ask;
+mod meshes;
+mod message;
+
+use crate::asking;
+use crate::console::{Failure, Record, record};
+use ask::Answered;
+use bvh_query::Querier;
+use clap::Args;
+use meshes::Meshes;
+use message::Message;
+use std::io::{BufRead as _, Write as _};
+
+const HELP: &str = "\
+Examples:
+  cbvh suite
+  python spec/suite/run.py --runner 'cbvh suite'
+
+spec/suite/PROTOCOL.md defines the lines that the command reads and writes. Meshes are baked in memory with the default \
+options. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
+
+/// What `suite` accepts.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct SuiteArguments {
+    /// Instruction set of the queries: auto, scalar, avx2, avx512, neon or simd128
+    #[arg(long, value_name = "ISA", default_value = "auto")]
+    isa: String,
+}
+
+/// The greatest error of a distance that the command claims, as a fraction of the largest coordinate of the question: 45
+/// roundings. bvh-query measures the closest triangles in f64, so a distance far below their size has fewer digits. The bounds
+/// that come with each distance are certified, and the suite checks them exactly.
+const MAX_DISTANCE_ERROR_OF_SIZE: f64 = 1e-14;
+
+/// Answers each line of standard input with one line on standard output.
+pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
+    let mut querier = Querier::with_backend(asking::backend(&arguments.isa)?);
+    let mut meshes = Meshes::default();
+    let mut output = std::io::stdout().lock();
+    for line in std::io::stdin().lock().lines() {
+        let line = line.map_err(|error| Failure::System(format!("standard input: cannot read: {error}")))?;
+        if line.trim().is_empty() {
+            continue;
+        }
+        let answer = answer(&line, &mut meshes, &mut querier);
+        writeln!(output, "{answer}")
+            .and_then(|()| output.flush())
+            .map_err(|error| Failure::from_output(&error))?;
+    }
+    Ok(())
+}
+
+/// Answers one line.
+fn answer(line: &str, meshes: &mut Meshes, querier: &mut Querier) -> Record {
+    match serde_json::from_str(line) {
+        Ok(Message::Hello(_)) => hello(),
+        Ok(Message::Mesh(mesh)) => match meshes.add(&mesh) {
+            Ok(triangles) => record! { mesh: mesh.mesh, triangles: triangles },
+            Err(reason) => record! { mesh: mesh.mesh }.with(refusal(&reason)),
+        },
+        Ok(Message::Question(question)) => {
+            let id = record! { id: question.id };
+            match ask::ask(&question, meshes, querier) {
+                Ok(Answered(answer)) => id.with(answer),
+                Err(reason) => id.with(refusal(&reason)),
+            }
+        }
+        Err(error) => refusal(&format!("expected a line of the protocol, found {error}")),
+    }
+}
+
+/// States what the command claims.
+fn hello() -> Record {
+    record! {
+        hello: 1,
+        name: "cbvh",
+        version: env!("CARGO_PKG_VERSION"),
+        settings: "meshes baked in memory with the default options",
+        coordinates: "f32",
+        placement: "f64",
+        questions: ask::QUESTIONS,
+        features: ["open", "concave", "degenerate", "nested", "overlapping parts", "range", "refuses"],
+        distance_error: MAX_DISTANCE_ERROR_OF_SIZE,
+        error_unit: "size",
+    }
+}
+
+/// Refuses to answer, for a reason.
+fn refusal(reason: &str) -> Record {
+    record! { refused: true, reason: reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_line_gets_an_answer() {
+        let (mut meshes, mut querier) = (Meshes::default(), Querier::new().unwrap());
+        let mut ask = |line: &str| answer(line, &mut meshes, &mut querier).to_string();
+        assert!(ask(r#"{"hello": 1}"#).starts_with(r#"{"hello":1,"name":"cbvh""#));
+        for line in
+            ["", "{", "[]", "{}", r#"{"id": 1}"#, r#"{"mesh": 3}"#, r#"{"id": 1, "ask": "age", "a": "t"}"#]
+        {
+            assert!(ask(line).contains(r#""refused":true"#), "{line}");
+        }
+        let triangle =
+            r#"{"mesh": "t", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}"#;
+        assert_eq!(ask(triangle), r#"{"mesh":"t","triangles":1}"#);
+        let pose = "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.5]";
+        let line = format!(r#"{{"id": 7, "ask": "distance", "a": "t", "b": "t", "pose": {pose}}}"#);
+        assert!(ask(&line).starts_with(r#"{"id":7,"answer":0.5,"lower":"#));
+    }
+
+    #[test]
+    fn what_is_no_mesh_or_not_exactly_stored_is_refused() {
+        let (mut meshes, mut querier) = (Meshes::default(), Querier::new().unwrap());
+        for (corner, triangle) in [
+            (r#"["nan", 0, 0]"#, "[0, 1, 2]"),
+            (r#"["-inf", 0, 0]"#, "[0, 1, 2]"),
+            ("[0, 0, 0]", "[0, 1, 3]"),
+            // 1 and 0.1 in double precision have no common grid of single precision.
+            ("[0.1, 0, 0]", "[0, 1, 2]"),
+        ] {
+            let line = format!(
+                r#"{{"mesh": "m", "vertices": [{corner}, [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [{triangle}]}}"#
+            );
+            let refused = answer(&line, &mut meshes, &mut querier).to_string();
+            assert!(refused.contains(r#""refused":true"#), "{refused}");
+            let asked = r#"{"id": 1, "ask": "side", "a": "m", "point": [0, 0, 0]}"#;
+            let refused = answer(asked, &mut meshes, &mut querier).to_string();
+            assert!(refused.contains(r#""refused":true"#), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+"""A truth that is changed, a case that breaks the schema and a mesh that is changed are all found."""
+
+import copy
+import json
+import sys
+import unittest
+from pathlib import Path
+
+SUITE = Path(__file__).parent.parent
+sys.path.insert(0, str(SUITE))
+
+import check
+import exact
+import meshes
+from schema import problems
+
+
+class Checks(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.cases, cls.faults = check.load()
+
+    def test_the_files_are_as_promised(self):
+        self.assertEqual(self.faults, [])
+        self.assertGreaterEqual(len(self.cases), 1000)
+        self.assertGreaterEqual(sum(len(case["items"]) for case in self.cases), 10_000)
+        self.assertLess(sum(path.stat().st_size for path in (SUITE / "cases").iterdir()), 5_000_000)
+
+    def test_the_documents_state_the_counts(self):
+        text = (SUITE / "README.md").read_text()
+        answers = sum(len(case["items"]) for case in self.cases)
+        self.assertIn(f"asks a library {answers:,} such questions in {len(self.cases):,} cases", " ".join(text.split()))
+        for path in (SUITE / "cases").iterdir():
+            self.assertIn(f"| `{path.stem}` |", text)
+        version = (SUITE / "VERSION").read_text().strip()
+        self.assertIn(f"\nversion: {version}\n", (SUITE / "CITATION.cff").read_text())
+
+    def test_a_changed_truth_is_found(self):
+        changed = 0
+        for ask in sorted({case["ask"] for case in self.cases}):
+            case = copy.deepcopy(next(c for c in self.cases if c["ask"] == ask and c["level"] < 3))
+            case["items"] = case["items"][:1]
+            self.assertEqual(check.check(case), [], ask)
+            truth = case["items"][0]["truth"]
+            if isinstance(truth, bool):
+                case["items"][0]["truth"] = not truth
+            elif isinstance(truth, list):
+                case["items"][0]["truth"] = [*truth, [0, 999]]
+            elif isinstance(truth, dict) and "lower" in truth:
+                truth["lower"] = exact.to_hex(exact.from_hex(truth["lower"]) * 0.5 - 1)
+            elif isinstance(truth, dict):
+                case["items"][0]["truth"] = {"free": False} if "free" in truth else {"hit": True}
+            else:
+                case["items"][0]["truth"] = "mixed"
+            changed += 1
+            self.assertNotEqual(check.check(case), [], ask)
+        self.assertEqual(changed, 12)
+
+    def test_the_schema_finds_faults(self):
+        schema = json.loads((SUITE / "SCHEMA.json").read_text())
+        for change in ({"level": 4}, {"id": "x"}, {"items": []}, {"extra": 1}, {"ask": "age"}, {"tags": "a"}, {"items": [{"truth": 0.5}]}):
+            self.assertNotEqual(problems({**self.cases[0], **change}, schema["$defs"]["case"], schema), [], change)
+
+    def test_a_changed_mesh_is_found(self):
+        lines = check.read_lines(SUITE / "cases" / "meshes.jsonl")
+        written, made = (next(line for line in lines if key in line) for key in ("vertices", "make"))
+        written["vertices"][0][0] = "0x1p+9"
+        made["arguments"][0] += 1
+        for line in (written, made):
+            with self.assertRaises(ValueError):
+                meshes.load(line)
+
+
+if __name__ == "__main__":
+    unittest.main()
