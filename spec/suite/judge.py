@@ -1,12 +1,15 @@
 """Compares an answer with the truth of its question."""
 
 from fractions import Fraction
+from math import isfinite
 
-from exact import SPECIAL, from_hex
+from exact import from_hex
 
 RIGHT, FALSE_NEGATIVE, FALSE_POSITIVE, WRONG, UNDECIDED, REFUSED = "right", "false negative", "false positive", "wrong", "undecided", "refused"
 # Times of motions are those of poses that a runner interpolates in its own arithmetic: this much, of 1, is forgiven.
 TIME_SLACK = 2.0**-40
+# Without a limit, 0 and a number beyond both meshes would bound every depth.
+MAX_UPPER_PER_DEPTH = 2.0
 
 
 class Verdict:
@@ -52,19 +55,25 @@ def yes_or_no(truth, found):
 
 def pairs(truth, found, either_way):
     """Compares lists of pairs of triangles, in any order. A missing pair weighs more than one too many."""
-    try:
-        order = sorted if either_way else list
-        found = [tuple(order((int(i), int(j)))) for i, j in found]
-    except (TypeError, ValueError):
+    if not isinstance(found, list) or not all(is_pair(pair) for pair in found):
         return WRONG
+    found = [tuple(sorted(pair) if either_way else pair) for pair in found]
     truth = {tuple(pair) for pair in truth}
     if truth - set(found):
         return FALSE_NEGATIVE
     return RIGHT if len(found) == len(truth) and not set(found) - truth else FALSE_POSITIVE
 
 
+def is_pair(value):
+    return isinstance(value, list) and len(value) == 2 and all(type(index) is int for index in value)
+
+
 def is_number(value):
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and str(float(value)) not in SPECIAL
+    """Tells whether a value of JSON is a number that a float can state."""
+    try:
+        return type(value) in (int, float) and isfinite(value)
+    except OverflowError:
+        return False
 
 
 def is_at_most(value, truth):
@@ -80,6 +89,11 @@ def is_at_least(value, truth):
     return Fraction(value) >= Fraction(truth["exact"]) if "exact" in truth else value >= from_hex(truth["lower"])
 
 
+def allowed_error(profile, number, size):
+    """Returns the error that the runner claims for a number."""
+    return profile.get("distance_error", 0.0) * (number if profile.get("error_unit", "distance") == "distance" else size)
+
+
 def number(truth, found, answer, profile, size):
     """Judges a number by the error that the runner claims, and its bounds, where it gives them, by themselves."""
     if not is_number(found):
@@ -88,13 +102,12 @@ def number(truth, found, answer, profile, size):
     error = max(lower - found, found - upper, 0.0)
     relative = error / lower if lower else (0.0 if error == 0.0 else float("inf"))
     of_size = error / size if size else error
-    claimed = profile.get("distance_error", 0.0)
-    allowed = claimed * (lower if profile.get("error_unit", "distance") == "distance" else size)
     bounds = [answer.get("lower"), answer.get("upper")]
     if bounds != [None, None]:
         if not all(is_number(b) for b in bounds) or not is_at_most(bounds[0], truth) or not is_at_least(bounds[1], truth):
-            return Verdict(WRONG, relative, of_size)
-    word = RIGHT if error <= allowed else FALSE_NEGATIVE if upper == 0.0 else FALSE_POSITIVE if found == 0 else WRONG
+            return Verdict(WRONG, relative if lower else None, of_size)
+    is_right = error <= allowed_error(profile, lower, size)
+    word = RIGHT if is_right else FALSE_NEGATIVE if upper == 0.0 < found else FALSE_POSITIVE if found == 0 else WRONG
     return Verdict(word, relative if lower else None, of_size)
 
 
@@ -114,15 +127,19 @@ def motion(truth, found, answer, grazing):
 
 
 def penetration(truth, found, answer, profile, size):
-    """Judges bounds of a depth, or an estimate in place of bounds."""
+    """Judges an estimate of a depth, or bounds in place of it. Bounds have to tell something: the upper one is at most twice the depth."""
     if found is not None:
-        return number(truth, found, {}, profile, size)
+        return number(truth, found, answer, profile, size)
     lower, upper = answer.get("lower"), answer.get("upper")
     if not is_number(lower) or not is_number(upper):
         return Verdict(WRONG)
-    if from_hex(truth["upper"]) == 0.0:
-        return Verdict(RIGHT if lower <= 0.0 and 0.0 <= upper <= 1e-12 * size else FALSE_POSITIVE)
     depth = from_hex(truth["lower"])
-    # The bounds are compared with the exact depth, but a unit in the last place of its float is forgiven.
-    ok = lower <= from_hex(truth["upper"]) and upper >= depth
-    return Verdict(RIGHT if ok else FALSE_NEGATIVE if upper < depth else FALSE_POSITIVE, (upper - depth) / depth, (upper - depth) / size)
+    excess = max(upper - depth, 0.0)
+    errors = excess / depth if depth else None, excess / size
+    if not is_at_least(upper, truth):
+        return Verdict(FALSE_NEGATIVE, *errors)
+    if not is_at_most(lower, truth):
+        return Verdict(FALSE_POSITIVE, *errors)
+    if upper > MAX_UPPER_PER_DEPTH * depth + allowed_error(profile, depth, size):
+        return Verdict(WRONG if depth else FALSE_POSITIVE, *errors)
+    return Verdict(RIGHT, *errors)

@@ -34,7 +34,10 @@ class Judge(unittest.TestCase):
         self.assertEqual(word("contacts", truth, {"answer": [[2, 3]]}), "false negative")
         self.assertEqual(word("contacts", truth, {"answer": [[0, 1], [2, 3], [1, 0]]}), "false positive")
         self.assertEqual(word("contacts", truth, {"answer": [[0, 1], [2, 3], [2, 3]]}), "false positive")
-        self.assertEqual(word("contacts", truth, {"answer": 2}), "wrong")
+        for other in (2, None, True, "01", {"01": 0, "23": 0}, ["01", "23"], [["0", "1"], ["2", "3"]], [[0.0, 1.0], [2.0, 3.0]]):
+            self.assertEqual(word("contacts", truth, {"answer": other}), "wrong")
+        for other in ([[False, True], [2, 3]], [[0, 1, 2]], [[0]], [0, 1], [[float("inf"), 0]], [[None, 0]], [[[0], [1]]], [{}]):
+            self.assertEqual(word("contacts", truth, {"answer": other}), "wrong")
         self.assertEqual(word("self_contacts", truth, {"answer": [[1, 0], [3, 2]]}), "right")
 
     def test_distances(self):
@@ -45,8 +48,10 @@ class Judge(unittest.TestCase):
         self.assertEqual(word("distance", HALF, {"answer": 0.0}), "false positive")
         self.assertEqual(word("distance", ZERO, {"answer": 1e-12}), "false negative")
         self.assertEqual(word("distance", ZERO, {"answer": 1e-12}, OF_SIZE), "right")
-        for other in (None, "nan", True, "0.5"):
+        self.assertEqual(word("distance", ZERO, {"answer": -1e-12}), "wrong")
+        for other in (None, "nan", True, "0.5", [0.5], {"answer": 0.5}, 10**400, -(10**400), float("nan"), float("inf"), float("-inf"), 1e308):
             self.assertEqual(word("distance", HALF, {"answer": other}), "wrong")
+            self.assertEqual(word("distance", HALF, {"answer": 0.5, "lower": 0.4, "upper": other}) == "right", other == 1e308)
 
     def test_bounds_are_judged_exactly(self):
         self.assertEqual(word("distance", HALF, {"answer": 0.5, "lower": 0.4, "upper": 0.5}), "right")
@@ -80,7 +85,18 @@ class Judge(unittest.TestCase):
         self.assertEqual(word("penetration", HALF, {"lower": 0.25, "upper": 0.4}), "false negative")
         self.assertEqual(word("penetration", ZERO, {"lower": 0, "upper": 0}), "right")
         self.assertEqual(word("penetration", ZERO, {"lower": 0, "upper": 0.1}), "false positive")
+        self.assertEqual(word("penetration", ZERO, {"lower": 0, "upper": 1e-8}, OF_SIZE), "right")
         self.assertEqual(word("penetration", HALF, {"answer": 0.5}), "right")
+        self.assertEqual(word("penetration", HALF, {"answer": 0.5, "lower": 0.4, "upper": 0.6}), "right")
+        self.assertEqual(word("penetration", HALF, {"answer": 0.5, "lower": 0.6, "upper": 0.7}), "wrong")
+        for other in (None, "0", True, 10**400, float("inf"), float("nan")):
+            self.assertEqual(word("penetration", HALF, {"lower": 0, "upper": other}), "wrong")
+            self.assertEqual(word("penetration", HALF, {"lower": other, "upper": 0.5}), "wrong")
+
+    def test_bounds_that_hold_for_everything_are_not_right(self):
+        self.assertEqual(word("penetration", HALF, {"lower": 0, "upper": 1.0}), "right")
+        self.assertEqual(word("penetration", HALF, {"lower": 0, "upper": 1.01}), "wrong")
+        self.assertEqual(word("penetration", HALF, {"lower": -1e308, "upper": 1e308}), "wrong")
 
     def test_refusals(self):
         self.assertEqual(word("collide", "refused", {"refused": True}), "right")
