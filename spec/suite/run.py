@@ -8,20 +8,26 @@ Needs Python 3.9 or later. Exits with 0 if all answers are right, with 1 if not,
 
 import argparse
 import json
+import reprlib
 import sys
 import time
 from pathlib import Path
 
 import meshes
 from exact import SPECIAL, from_hex
-from judge import FALSE_NEGATIVE, FALSE_POSITIVE, REFUSED, RIGHT, UNDECIDED, WRONG, judge
+from judge import FALSE_NEGATIVE, FALSE_POSITIVE, REFUSED, RIGHT, UNDECIDED, WRONG, is_number, judge
 from process import Crashed, Garbage, Hung, Process
 
 HERE = Path(__file__).parent
 PROTOCOL = 1
 HELLO_SECONDS = 60
-# After this many crashes and hangs, the rest of a case is not asked.
+# After this many crashes, hangs and lines of garbage, the rest of a case is not asked.
 MAX_FAILURES_PER_CASE = 3
+# The largest error that a profile may claim, as a part of the number or of the size. With 1, a distance of 0 would always be right.
+MAX_CLAIMED_ERROR = 0.01
+CLAIMS = ("questions", "coordinates", "placement", "features", "distance_error", "error_unit")
+# A longer answer is cut short in a report.
+MAX_SHOWN_CHARACTERS = 1000
 COUNTS = ("right", "false_negatives", "false_positives", "other_wrong", "garbage", "crashes", "hangs", "refused", "undecided", "unasked")
 WORDS = {RIGHT: "right", FALSE_NEGATIVE: "false_negatives", FALSE_POSITIVE: "false_positives", WRONG: "other_wrong", REFUSED: "refused", UNDECIDED: "undecided"}
 
@@ -65,6 +71,31 @@ def question(number, case, item):
     return asked
 
 
+def profile_fault(profile):
+    """Returns what is wrong with a greeting, or None."""
+    for key in ("questions", "features"):
+        names = profile.get(key, [])
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            return f"expected {key} to be a list of names"
+    for key, known in (("coordinates", ("f32", "f64")), ("placement", ("f32", "f64")), ("error_unit", ("distance", "size"))):
+        if profile.get(key, known[0]) not in known:
+            return f"expected {key} to be {known[0]} or {known[1]}"
+    error = profile.get("distance_error", 0.0)
+    if not is_number(error) or not 0.0 <= error <= MAX_CLAIMED_ERROR:
+        return f"expected distance_error to be from 0 to {MAX_CLAIMED_ERROR}"
+    return None if profile.get("hello") == PROTOCOL else f"expected hello to be {PROTOCOL}"
+
+
+def shown(value):
+    """Returns what a runner said as the report has it: as text, cut short, if it is long or if JSON cannot state it."""
+    try:
+        if len(json.dumps(value, allow_nan=False)) <= MAX_SHOWN_CHARACTERS:
+            return value
+    except (ValueError, RecursionError):
+        pass
+    return reprlib.repr(value)
+
+
 class Run:
     """One runner and what it has been found to do."""
 
@@ -72,16 +103,22 @@ class Run:
         self.arguments, self.meshes = arguments, meshes_by_name
         self.process, self.profile, self.number = None, None, 0
         self.by_ask, self.by_tag, self.examples = {}, {}, {}
-        self.cases, self.seconds, self.starts = 0, [], 0
+        self.cases, self.seconds = 0, []
         self.sizes = {}
 
     def start(self):
         """Starts the runner and greets it."""
-        self.process, self.starts = Process(self.arguments.runner, self.arguments.timeout), self.starts + 1
-        profile, _ = self.process.exchange({"hello": PROTOCOL}, HELLO_SECONDS)
-        if profile.get("hello") != PROTOCOL:
-            raise Garbage(profile)
+        self.process = Process(self.arguments.runner)
+        profile, _ = self.process.exchange({"hello": PROTOCOL}, HELLO_SECONDS if self.profile is None else self.at_most(HELLO_SECONDS))
+        if fault := profile_fault(profile):
+            raise Garbage(fault)
+        if self.profile is not None and any(profile.get(key) != self.profile.get(key) for key in CLAIMS):
+            raise Garbage("expected the claims of the first greeting")
         self.profile = profile
+
+    def at_most(self, seconds):
+        """Returns the seconds to wait for an answer: no more than the budget leaves."""
+        return max(0.0, min(seconds, self.arguments.until - time.monotonic()))
 
     def stop(self):
         if self.process is not None:
@@ -94,18 +131,26 @@ class Run:
             self.sizes[name] = max((abs(from_hex(x)) for p in self.meshes[name][0] for x in p if x not in SPECIAL), default=0.0)
         return self.sizes[name]
 
+    def size_of(self, case, item):
+        """Returns the largest coordinate of a question, and for a ray the largest parameter that it makes."""
+        size = max(self.size(case[key]) for key in ("a", "b") if key in case)
+        for key in ("pose", "point", "origin"):
+            finite = [abs(from_hex(x)) for x in item.get(key, ()) if x not in SPECIAL]
+            size = max(size, *(finite[3::4] if key == "pose" and len(finite) == 12 else finite), 0.0)
+        return size / max(abs(from_hex(x)) for x in item["direction"]) if case["ask"] == "ray" else size
+
     def send_mesh(self, name):
         if name in self.process.sent:
             return
         vertices, triangles = self.meshes[name]
         message = {"mesh": name, "vertices": [[plain(x) for x in p] for p in vertices], "triangles": triangles}
-        answer, _ = self.process.exchange(message)
+        answer, _ = self.process.exchange(message, self.at_most(self.arguments.timeout))
         if answer.get("mesh") != name:
             raise Garbage(answer)
         self.process.sent.add(name)
 
     def ask(self, case, item):
-        """Asks one question and returns what became of it, a word of COUNTS, and the verdict if there is one."""
+        """Asks one question and returns what became of it, a word of COUNTS, the verdict if there is one, and what the runner said."""
         try:
             if self.process is None:
                 self.start()
@@ -113,41 +158,42 @@ class Run:
                 if key in case:
                     self.send_mesh(case[key])
             self.number += 1
-            answer, seconds = self.process.exchange(question(self.number, case, item))
+            answer, seconds = self.process.exchange(question(self.number, case, item), self.at_most(self.arguments.timeout))
             if answer.get("id") != self.number:
                 raise Garbage(answer)
-        except (Crashed, Hung, Garbage) as failure:
+        except (Crashed, Hung, Garbage, OSError) as failure:
             self.stop()
-            return {Crashed: "crashes", Hung: "hangs", Garbage: "garbage"}[type(failure)], None, None
+            if isinstance(failure, Hung):
+                # What the budget has cut short may not be the runner's fault.
+                return "unasked" if self.is_late() else "hangs", None, None
+            return "garbage" if isinstance(failure, Garbage) else "crashes", None, str(failure) or None
         self.seconds.append(seconds)
-        size = max(self.size(case[key]) for key in ("a", "b") if key in case)
-        for key in ("pose", "point"):
-            finite = [abs(from_hex(x)) for x in item.get(key, ()) if x not in SPECIAL]
-            size = max(size, *(finite[3::4] if key == "pose" and len(finite) == 12 else finite), 0.0)
-        if case["ask"] == "ray":
-            size /= max(abs(from_hex(x)) for x in item["direction"])
-        verdict = judge(case, item, answer, self.profile, size)
+        verdict = judge(case, item, answer, self.profile, self.size_of(case, item))
         return WORDS[verdict.word], verdict, answer
+
+    def is_late(self):
+        """Tells whether the budget is spent."""
+        return time.monotonic() >= self.arguments.until
 
     def case(self, case):
         """Asks all questions of a case."""
         self.cases += 1
         failures = 0
         for index, item in enumerate(case["items"]):
-            late = time.monotonic() > self.arguments.until
-            word, verdict, answer = ("unasked", None, None) if failures >= MAX_FAILURES_PER_CASE or late else self.ask(case, item)
+            is_left = failures >= MAX_FAILURES_PER_CASE or self.is_late()
+            word, verdict, answer = ("unasked", None, None) if is_left else self.ask(case, item)
             failures += word in ("crashes", "hangs", "garbage")
             for group, key in ((self.by_ask, case["ask"]), (self.by_tag, case["tags"][0])):
                 row = group.setdefault(key, dict.fromkeys(COUNTS, 0) | {"max_relative_error": 0.0, "max_error_of_size": 0.0})
                 row[word] += 1
-                if verdict is not None and verdict.relative is not None:
-                    row["max_relative_error"] = max(row["max_relative_error"], verdict.relative)
-                if verdict is not None and verdict.of_size is not None:
-                    row["max_error_of_size"] = max(row["max_error_of_size"], verdict.of_size)
+                if verdict is not None:
+                    for name, error in (("max_relative_error", verdict.relative), ("max_error_of_size", verdict.of_size)):
+                        # JSON has no infinity.
+                        row[name] = max(row[name], min(error or 0.0, sys.float_info.max))
             if word != "right":
                 known = self.examples.setdefault((case["ask"], word), [])
                 if len(known) < self.arguments.examples:
-                    known.append({"case": case["id"], "item": index, "truth": item["truth"], "answer": answer})
+                    known.append({"case": case["id"], "item": index, "truth": item["truth"], "answer": shown(answer)})
 
     def report(self, skipped):
         """Returns the object that `--json` prints."""
@@ -156,7 +202,7 @@ class Run:
         answers = sum(total.values())
         times = sorted(self.seconds)
         return {
-            "runner": {key: self.profile.get(key) for key in ("name", "version", "settings", "coordinates", "placement", "features", "distance_error", "error_unit")},
+            "runner": {key: shown(self.profile.get(key)) for key in ("name", "version", "settings", "coordinates", "placement", "features", "distance_error", "error_unit")},
             "suite": (HERE / "VERSION").read_text().strip(),
             "cases": self.cases,
             "answers": answers,
@@ -190,6 +236,13 @@ def table(report):
     return lines
 
 
+def positive(text):
+    """Returns a number above 0 of the command line."""
+    if int(text) < 1:
+        raise ValueError(text)
+    return int(text)
+
+
 def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runner", required=True, help="the command of the runner")
@@ -197,19 +250,27 @@ def main(argv=None):
     parser.add_argument("--level", type=int, default=3, help="ask cases up to this level: 1 plain, 2 boundary, 3 hostile")
     parser.add_argument("--tags", default="", help="ask only cases with one of these tags, separated by commas")
     parser.add_argument("--questions", default="", help="ask only these questions, separated by commas")
-    parser.add_argument("--sample", type=int, default=1, metavar="N", help="ask every Nth case")
+    parser.add_argument("--sample", type=positive, default=1, metavar="N", help="ask every Nth case")
     parser.add_argument("--timeout", type=float, default=10.0, help="seconds for one answer")
-    parser.add_argument("--budget", type=float, default=600.0, help="seconds for everything; what is left then counts as unasked")
+    parser.add_argument("--budget", type=float, default=570.0, help="seconds for everything; what is left then counts as unasked")
     parser.add_argument("--examples", type=int, default=2, help="wrong answers to show for each question and kind")
     arguments = parser.parse_args(argv)
     arguments.until = time.monotonic() + arguments.budget
     meshes_by_name, cases = load()
     run = Run(arguments, meshes_by_name)
     try:
-        run.start()
-    except (Crashed, Hung, Garbage, OSError) as failure:
+        return ask_all(run, arguments, cases)
+    finally:
         run.stop()
-        print(f"{arguments.runner}: expected a greeting, found {type(failure).__name__}: {failure}", file=sys.stderr)
+
+
+def ask_all(run, arguments, cases):
+    """Greets the runner, asks it the cases that are chosen, prints the report, and returns the exit code."""
+    try:
+        run.start()
+    except (Crashed, Hung, Garbage, OSError, ValueError) as failure:
+        found = {Crashed: "the end of its output", Hung: f"nothing within {HELLO_SECONDS} seconds"}.get(type(failure), failure)
+        print(f"{arguments.runner}: expected an answer to {json.dumps({'hello': PROTOCOL})}, found {found}", file=sys.stderr)
         return 2
     tags, questions = set(filter(None, arguments.tags.split(","))), set(filter(None, arguments.questions.split(",")))
     chosen = [c for c in cases if c["level"] <= arguments.level and (not tags or tags & set(c["tags"])) and (not questions or c["ask"] in questions)]
@@ -217,9 +278,8 @@ def main(argv=None):
     asked = [case for case in chosen if is_claimed(case, run.profile)]
     for case in asked:
         run.case(case)
-    run.stop()
     report = run.report(len(chosen) - len(asked))
-    print(json.dumps(report) if arguments.json else "\n".join(table(report)))
+    print(json.dumps(report, allow_nan=False) if arguments.json else "\n".join(table(report)))
     return 0 if is_clean(report) else 1
 
 

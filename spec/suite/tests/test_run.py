@@ -3,8 +3,11 @@
 import contextlib
 import io
 import json
+import os
 import shlex
+import subprocess
 import sys
+import time
 import unittest
 from pathlib import Path
 
@@ -22,10 +25,18 @@ def through(how, every):
 
 def asked(command, *options):
     """Returns the exit code and the report of a run on a few cases."""
-    output = io.StringIO()
+    output, joined = io.StringIO(), shlex.join(command) if os.name == "posix" else subprocess.list2cmdline(command)
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
-        code = run.main(["--runner", shlex.join(command), "--json", *(options or ("--sample", "61", "--level", "2"))])
-    return code, json.loads(output.getvalue().splitlines()[-1]) if code != 2 else output.getvalue()
+        code = run.main(["--runner", joined, "--json", *(options or ("--sample", "61", "--level", "2"))])
+    return code, json.loads(output.getvalue().splitlines()[-1], parse_constant=no_json) if code != 2 else output.getvalue()
+
+
+def no_json(text):
+    raise ValueError(f"expected JSON, found {text}")
+
+
+def odd(answer, **claims):
+    return [sys.executable, str(SUITE / "tests" / "odd_runner.py"), answer, json.dumps(claims)]
 
 
 class Runs(unittest.TestCase):
@@ -71,6 +82,59 @@ class Runs(unittest.TestCase):
     def test_what_does_not_greet_does_not_run(self):
         self.assertEqual(asked([sys.executable, "-c", "print('hello')"])[0], 2)
         self.assertEqual(asked(["/no/such/runner"])[0], 2)
+        for command in ("", "'"):
+            with contextlib.redirect_stderr(io.StringIO()):
+                self.assertEqual(run.main(["--runner", command]), 2)
+
+    def test_claims_that_are_none_do_not_run(self):
+        for claims in (
+            {"hello": 2}, {"questions": "collide"}, {"questions": 5}, {"features": [["open"]]}, {"coordinates": "f16"}, {"error_unit": "metre"},
+            {"distance_error": "1"}, {"distance_error": -1}, {"distance_error": 1.0}, {"distance_error": float("nan")}, {"distance_error": 10**400},
+        ):  # fmt: skip
+            self.assertEqual(asked(odd("", **claims))[0], 2, claims)
+
+    def test_who_claims_nothing_has_not_passed(self):
+        code, report = asked(odd("", questions=[]))
+        self.assertEqual((code, report["cases"], report["answers"], report["wrong"]), (1, 0, 0, 0))
+
+    def test_who_refuses_everything_has_not_passed(self):
+        code, report = asked(odd('{"id": ID, "refused": true}'))
+        self.assertEqual((code, report["right"], report["refused"]), (1, 0, report["answers"]))
+
+    def test_odd_answers_are_wrong_and_end_nothing(self):
+        long, deep = "1" * 400, "[" * 500 + "]" * 500
+        for answer in (
+            '"nan"', "NaN", "-Infinity", "1e999", long, f'"{"x" * 10**5}"', "[" + "[1, 1], " * 10**4 + "[1, 1]]", deep, '"\\ud800"',
+            "null", "{}", '[["0", "1"]]', "[[1e999, 0]]", f"[[{long}, {long}]]", '1, "lower": NaN, "upper": Infinity', '-5, "t": 1e308',
+        ):  # fmt: skip
+            code, report = asked(odd(f'{{"id": ID, "answer": {answer}}}'), "--sample", "211")
+            self.assertEqual((code, report["right"], report["wrong"]), (1, 0, report["answers"]), answer)
+            self.assertLess(len(json.dumps(report)), 50_000)
+
+    def test_an_answer_to_another_question_is_garbage(self):
+        for line in ('{"id": 0, "answer": true}', '{"answer": true}', '{"id": "ID", "answer": true}', "[]"):
+            code, report = asked(odd(line), "--sample", "601")
+            self.assertEqual((code, report["garbage"] + report["unasked"]), (1, report["answers"]))
+            self.assertGreater(report["garbage"], 0)
+
+    def test_claims_cannot_change_when_the_runner_starts_again(self):
+        one = run.Run(None, {})
+        one.profile = {"hello": 1, "distance_error": 0.0}
+        one.arguments = type("Arguments", (), {"until": time.monotonic() + 60, "runner": shlex.join(odd(""))})
+        with self.assertRaises(run.Garbage):
+            one.start()
+        one.stop()
+
+    def test_the_largest_coordinate_counts_the_origin_of_a_ray(self):
+        item = {"origin": ["0x1p+10", "-0x1p+11", "0x0p+0"], "direction": ["0x0p+0", "0x1p+2", "0x0p+0"]}
+        one = run.Run(None, {"a": ([["0x1p+0", "0x0p+0", "0x0p+0"]], [])})
+        self.assertEqual(one.size_of({"ask": "ray", "a": "a"}, item), 512.0)
+
+    def test_hangs_do_not_outlast_the_budget(self):
+        started = time.monotonic()
+        code, report = asked(through("hang", 1), "--timeout", "1000", "--budget", "3")
+        self.assertEqual((code, report["hangs"], report["unasked"]), (1, 0, report["answers"]))
+        self.assertLess(time.monotonic() - started, 20)
 
     def test_a_budget_ends_the_run(self):
         code, report = asked(HONEST, "--budget", "0")
