@@ -8,6 +8,7 @@ With --sample N, every Nth case is proved. Needs only Python's standard library,
 import argparse
 import json
 import sys
+from collections import Counter
 from multiprocessing import Pool
 from pathlib import Path
 
@@ -25,26 +26,34 @@ def read_lines(path):
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
+def load_meshes():
+    """Fills MESHES. Each process of a pool needs its own: not every system starts it as a copy of this one."""
+    MESHES.update((record["mesh"], meshes.load(record)) for record in read_lines(HERE / "cases" / "meshes.jsonl"))
+
+
 def load():
-    """Fills MESHES and returns all cases."""
-    schema = json.loads((HERE / "SCHEMA.json").read_text())
+    """Fills MESHES and returns all cases, and what is wrong with the files."""
+    schema = json.loads((HERE / "SCHEMA.json").read_text(encoding="utf-8"))
     faults, cases = [], []
+    load_meshes()
     for path in sorted((HERE / "cases").glob("*.jsonl")):
         kind = "mesh" if path.name == "meshes.jsonl" else "case"
         for number, line in enumerate(read_lines(path), 1):
             faults += [f"{path.name}:{number}: {found}" for found in problems(line, schema["$defs"][kind], schema)]
             if kind == "mesh":
-                MESHES[line["mesh"]] = meshes.load(line)
+                faults += [f"{path.name}:{number}: expected triangle_count {len(MESHES[line['mesh']][1])}"] if line["triangle_count"] != len(MESHES[line["mesh"]][1]) else []
             else:
                 cases.append(line)
     names = [case["id"] for case in cases]
-    faults += [f"{name}: expected an id once, found it again" for name in {n for n in names if names.count(n) > 1}] if len(set(names)) < len(names) else []
+    faults += [f"{name}: expected an id once, found it {count} times" for name, count in Counter(names).items() if count > 1]
     return cases, faults
 
 
 def check(case):
     """Returns what is wrong with a case."""
-    faults = []
+    coordinates = [x for key in ("a", "b") if key in case for corner in MESHES[case[key]][0] for x in corner]
+    is_held = case["needs"]["coordinates"] == "f64" or are_f32(coordinates)
+    faults = [] if is_held else [f"{case['id']}: expected coordinates that f32 holds"]
     for number, item in enumerate(case["items"]):
         where = f"{case['id']}, item {number}"
         question = {key: value for key, value in item.items() if key not in ("truth", "grazing")}
@@ -60,15 +69,23 @@ def check(case):
     return faults
 
 
+def are_f32(numbers):
+    return all(exact.is_f32(exact.fraction(x)) for x in numbers if x not in exact.SPECIAL)
+
+
 def check_placement(case, question):
-    """Checks that poses place the corners without any rounding in the precision that the case needs."""
+    """Checks that the precision that the case needs holds its points, and that poses place the corners in it without any rounding."""
     if prove.fault(case, MESHES, question):
         return []
+    stated = case["needs"]["placement"]
+    for key in ("point", "origin", "direction", "from", "to"):
+        if stated == "f32" and not are_f32(question.get(key, ())):
+            return [f"{key}: expected numbers that f32 holds"]
     for key in ("pose", "start", "end"):
         if key in question:
             found = exact.placement(prove.corners_of(MESHES[case["b"]]), [exact.fraction(x) for x in question[key]])
-            if found is None or found > case["needs"]["placement"]:
-                return [f"{key}: expected placed corners that {case['needs']['placement']} holds, found {found}"]
+            if found is None or found > stated:
+                return [f"{key}: expected placed corners that {stated} holds, found {found}"]
     return []
 
 
@@ -82,7 +99,7 @@ def main(argv=None):
     if arguments.jobs == 1:
         faults += [fault for case in chosen for fault in check(case)]
     else:
-        with Pool(arguments.jobs) as pool:
+        with Pool(arguments.jobs, load_meshes) as pool:
             faults += [fault for found in pool.imap(check, chosen, chunksize=4) for fault in found]
     for fault in faults:
         print(fault, file=sys.stderr)

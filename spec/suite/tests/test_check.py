@@ -2,7 +2,9 @@
 
 import copy
 import json
+import subprocess
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
@@ -27,7 +29,7 @@ class Checks(unittest.TestCase):
         self.assertLess(sum(path.stat().st_size for path in (SUITE / "cases").iterdir()), 5_000_000)
 
     def test_the_documents_state_the_counts(self):
-        text = (SUITE / "README.md").read_text()
+        text = (SUITE / "README.md").read_text(encoding="utf-8")
         answers = sum(len(case["items"]) for case in self.cases)
         self.assertIn(f"asks a library {answers:,} such questions in {len(self.cases):,} cases", " ".join(text.split()))
         for path in (SUITE / "cases").iterdir():
@@ -56,8 +58,26 @@ class Checks(unittest.TestCase):
             self.assertNotEqual(check.check(case), [], ask)
         self.assertEqual(changed, 12)
 
+    def test_a_precision_that_does_not_hold_the_numbers_is_found(self):
+        for key, fits in (("coordinates", lambda c: c["a"] == "fine-box"), ("placement", lambda c: c["ask"] == "closest"), ("placement", lambda c: c["ask"] == "collide")):
+            case = copy.deepcopy(next(c for c in self.cases if c["needs"][key] == "f64" and fits(c)))
+            case["items"] = case["items"][:2]
+            self.assertEqual(check.check(case), [])
+            case["needs"][key] = "f32"
+            self.assertNotEqual(check.check(case), [], key)
+
+    def test_processes_that_start_empty_prove_as_well(self):
+        # So start the processes of a pool on Windows and macOS.
+        program = "import multiprocessing, sys, check\nif __name__ == '__main__':\n multiprocessing.set_start_method('spawn')\n sys.exit(check.main(['--sample', '800', '--jobs', '2']))"
+        with tempfile.TemporaryDirectory() as folder:
+            script = Path(folder) / "spawn.py"
+            script.write_text(f"import sys\nsys.path.insert(0, {str(SUITE)!r})\n{program}\n", encoding="utf-8")
+            found = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(found.returncode, 0, found.stderr[-500:])
+        self.assertIn(" 0 faults", found.stdout)
+
     def test_the_schema_finds_faults(self):
-        schema = json.loads((SUITE / "SCHEMA.json").read_text())
+        schema = json.loads((SUITE / "SCHEMA.json").read_text(encoding="utf-8"))
         for change in ({"level": 4}, {"id": "x"}, {"items": []}, {"extra": 1}, {"ask": "age"}, {"tags": "a"}, {"items": [{"truth": 0.5}]}):
             self.assertNotEqual(problems({**self.cases[0], **change}, schema["$defs"]["case"], schema), [], change)
 
