@@ -2,7 +2,7 @@
 
 Distances, contacts and motions come from the shortest vector of a convex hull (Wolfe, "Finding the nearest point in a polytope",
 1976), insides from solid angles, hits of rays from segments that end at them, and depths from the hull of all differences of
-corners. Only vector arithmetic is shared with `truth`.
+corners. Only vector arithmetic and boxes are shared with `truth`.
 """
 
 from fractions import Fraction
@@ -10,7 +10,7 @@ from functools import lru_cache
 from itertools import combinations
 from math import atan2, isqrt, lcm, pi
 
-from truth import ZERO, box, box_gap, by_gap, components, cross, dot, is_closed, moved, primitive, sub, swept_box
+from truth import ZERO, box, box_gap, by_gap, cross, dot, moved, primitive, sub, swept_box
 
 
 def shortest(points):
@@ -161,6 +161,25 @@ def winding(point, triangles):
     return turns
 
 
+def is_closed(triangles):
+    """Tells whether the boundary of a surface is 0: the sum of its edges, where an edge and its opposite cancel out."""
+    boundary = {}
+    for t in triangles:
+        for p, q in zip(t, t[1:] + t[:1]):
+            edge = min(p, q), max(p, q)
+            boundary[edge] = boundary.get(edge, 0) + (p < q) - (q < p)
+    return not any(boundary.values())
+
+
+def corners_of_parts(triangles):
+    """Returns the corners of each part that is connected, by joining the corners of triangles to the parts that have one of them."""
+    parts = []
+    for t in triangles:
+        joined = set(t).union(*(part for part in parts if not part.isdisjoint(t)))
+        parts = [part for part in parts if part.isdisjoint(t)] + [joined]
+    return parts
+
+
 def side(point, triangles):
     if any(shortest([sub(p, point) for p in t]) == 0 for t in triangles if box_gap((point, point), box(t)) == 0):
         return "on"
@@ -170,16 +189,18 @@ def side(point, triangles):
 
 
 def relation(a, b):
-    """Returns how two closed meshes lie, from distances and solid angles at the last corner of each part."""
+    """Returns how two meshes lie, from distances and solid angles at the greatest corner of each part."""
     if squared_distance(a, b) == 0:
         return "touching"
-    inside_b = {winding(part[-1][2], b) != 0 for part in components(a)}
-    inside_a = {winding(part[-1][2], a) != 0 for part in components(b)}
-    return {
-        (False, False): "apart",
-        (True, False): "a in b",
-        (False, True): "b in a",
-    }.get((min(inside_b), min(inside_a)) if len(inside_b) == len(inside_a) == 1 else None, "mixed")
+    if not is_closed(a) or not is_closed(b):
+        return "undefined"
+    a_inside = {winding(max(part), b) != 0 for part in corners_of_parts(a)}
+    b_inside = {winding(max(part), a) != 0 for part in corners_of_parts(b)}
+    if a_inside == {True} and True not in b_inside:
+        return "a in b"
+    if b_inside == {True} and True not in a_inside:
+        return "b in a"
+    return "mixed" if True in a_inside | b_inside else "apart"
 
 
 @lru_cache(maxsize=64)

@@ -240,12 +240,14 @@ def components(triangles):
     return list(parts.values())
 
 
-def relation(a, b, winds=winding):
-    """Returns how two closed meshes lie. If they do not touch, one corner tells where a connected part is."""
+def relation(a, b):
+    """Returns how two meshes lie. If they are closed and do not touch, one corner tells where a connected part is."""
     if squared_distance(a, b) == 0:
         return "touching"
-    a_in_b = [winds(part[0][0], b) != 0 for part in components(a)]
-    b_in_a = [winds(part[0][0], a) != 0 for part in components(b)]
+    if not is_closed(a) or not is_closed(b):
+        return "undefined"
+    a_in_b = [winding(part[0][0], b) != 0 for part in components(a)]
+    b_in_a = [winding(part[0][0], a) != 0 for part in components(b)]
     if not any(a_in_b) and not any(b_in_a):
         return "apart"
     if all(a_in_b) and not any(b_in_a):
@@ -312,6 +314,8 @@ def first_touch(t, u, v):
     """
     if triangles_meet(t, u):
         return Fraction(0)
+    if v == ZERO:
+        return None
     back = (-v[0], -v[1], -v[2])
     times = [ray_triangle(p, v, t) for p in u] + [ray_triangle(p, back, u) for p in t]
     for i, j in EDGES:

@@ -60,7 +60,7 @@ class BothWays(unittest.TestCase):
         for _ in range(250):
             size = self.random.pick((2, 3, 10))
             t, u = self.points(3, size), self.points(3, size)
-            v = tuple(5 * x for x in self.points(1, 2)[0])
+            v = tuple(5 * x for x in self.points(1, self.random.pick((0, 2, 2)))[0])
             at = truth.motion([t], [u], v)
             self.assertTrue(second.motion_is([t], [u], v, at), (t, u, v, at))
             if at:
@@ -78,6 +78,35 @@ class BothWays(unittest.TestCase):
                 found.add(side)
                 self.assertEqual(side, second.side(point, triangles), point)
         self.assertEqual(found, {"on", "inside", "outside"})
+
+    def test_relations(self):
+        a = triangles_of("boxes", [6, 6, 6, 0, 0, 0], [2, 2, 2, 20, 0, 0])
+        known = {
+            "apart": triangles_of("box", 1, 1, 1, 0, 0, 12),
+            "touching": triangles_of("box", 1, 1, 1, 0, 0, 7),
+            "b in a": triangles_of("boxes", [1, 1, 1, 0, 0, 0], [1, 1, 1, 20, 0, 0]),
+            "a in b": triangles_of("box", 40, 40, 40),
+            "mixed": triangles_of("boxes", [1, 1, 1, 0, 0, 0], [1, 1, 1, 0, 0, 20]),
+            "undefined": triangles_of("without", 2, "box", 1, 1, 1),
+        }
+        for relation, b in known.items():
+            self.assertEqual((truth.relation(a, b), second.relation(a, b)), (relation, relation))
+        # Each has a part inside the other one.
+        b = triangles_of("boxes", [1, 1, 1, 0, 0, 0], [4, 4, 4, 20, 0, 0])
+        self.assertEqual((truth.relation(a, b), second.relation(a, b)), ("mixed", "mixed"))
+        self.assertEqual((truth.relation(a, []), second.relation(a, [])), ("apart", "apart"))
+
+    def test_closed_surfaces_and_parts(self):
+        closed = 0
+        for _ in range(300):
+            corners = self.points(4, 1)
+            faces = [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)][: self.random.pick((3, 4, 4))]
+            triangles = [tuple(corners[i] for i in (f if self.random.below(20) else f[::-1])) for f in faces] + [self.points(3, 1)] * self.random.pick((0, 0, 0, 1))
+            self.assertEqual(truth.is_closed(triangles), second.is_closed(triangles), triangles)
+            closed += truth.is_closed(triangles)
+            parts = [{p for t in part for p in t} for part in truth.components(triangles)]
+            self.assertEqual(sorted(map(sorted, parts)), sorted(map(sorted, second.corners_of_parts(triangles))))
+        self.assertTrue(50 < closed < 250, closed)
 
     def test_depths(self):
         for a, b in ((("box", 2, 3, 4), ("octahedron", 3, 4, 5)), (("tetrahedron", 3), ("box", 1, 2, 2))):
