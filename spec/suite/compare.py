@@ -20,8 +20,8 @@ def main():
     print("| runner | version | question | answers | right | missed | invented | otherwise wrong | crashes, hangs | refused | undecided | error, of the number | of the size |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for path in sys.argv[1:]:
-        report = json.loads(Path(path).read_text().splitlines()[-1])
-        name, version = report["runner"]["name"], report["runner"]["version"]
+        report = json.loads(Path(path).read_text(encoding="utf-8").splitlines()[-1])
+        name, version = (str(report["runner"][key]) for key in ("name", "version"))
         for ask, row in report["by_question"].items():
             counts = ("right", "false_negatives", "false_positives", "other_wrong", "garbage", "crashes", "hangs", "refused", "undecided", "unasked")
             answers = sum(row[key] for key in counts)

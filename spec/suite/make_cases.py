@@ -16,6 +16,7 @@ from pathlib import Path
 import exact
 import meshes
 import prove
+import second
 import truth
 from exact import to_hex
 
@@ -276,9 +277,9 @@ def state(case):
 
 
 def is_grazing(case, item):
-    """Tells whether a motion touches or misses by so little that a runner may call it undecided: by a millionth of the size.
+    """Tells whether a motion touches or misses by so little that a runner may call it undecided: by a hundred-thousandth of the size.
 
-    A motion that hits is not grazing if the meshes still touch a millionth of the time later.
+    A motion that hits is not grazing if the meshes still touch 2^-20 of the time later.
     """
     a, b, v, unit = prove.motion_scene(case, MESHES, item)
     found = item["truth"]
@@ -288,8 +289,6 @@ def is_grazing(case, item):
         scale = later.denominator
         a, b = ([tuple(tuple(x * scale for x in p) for p in t) for t in of] for of in (a, b))
         return truth.squared_distance(a, [truth.moved(u, tuple(x * later.numerator for x in v)) for u in b]) != 0
-    import second
-
     size = max(x for t in a for p in t for x in map(abs, p))
     near = Fraction(size, 10**5) ** 2
     hulls = [(u + truth.moved(u, v), truth.swept_box(u, v)) for u in b]
@@ -538,13 +537,13 @@ def main():
     cases = [case for of in maker.cases.values() for case in of]
     with Pool(jobs) as pool:
         stated = dict((case["id"], case) for case in pool.imap_unordered(state, cases, chunksize=20) if case)
-    written = bytes_written = answers = 0
+    written = 0
     for file, of in maker.cases.items():
         lines = [json.dumps(stated[case["id"]], separators=(",", ":")) + "\n" for case in of if case["id"] in stated]
-        (CASES / f"{file}.jsonl").write_text("".join(lines))
+        (CASES / f"{file}.jsonl").write_bytes("".join(lines).encode())
         written += len(lines)
     lines = [json.dumps(record, separators=(",", ":")) + "\n" for record in RECORDS.values()]
-    (CASES / "meshes.jsonl").write_text("".join(lines))
+    (CASES / "meshes.jsonl").write_bytes("".join(lines).encode())
     answers = sum(len(case["items"]) for case in stated.values())
     bytes_written = sum(path.stat().st_size for path in CASES.glob("*.jsonl"))
     print(f"{written} cases, {answers} answers, {bytes_written} bytes")

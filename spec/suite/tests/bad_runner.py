@@ -1,6 +1,6 @@
 """A runner that misbehaves once in so many questions, between the suite and a good runner.
 
-    python bad_runner.py lie|crash|hang|garbage|deaf N COMMAND...
+    python bad_runner.py lie|crash|hang|garbage N COMMAND...
 """
 
 import json
@@ -30,8 +30,6 @@ def main():
     good = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     asked = 0
     for line in sys.stdin:
-        if how == "deaf":
-            time.sleep(1000)
         good.stdin.write(line)
         good.stdin.flush()
         answer = good.stdout.readline()
