@@ -1,7 +1,9 @@
 //! parry3d in double precision: two triangle meshes, points, rays and segments.
 //!
-//! B's corners are placed here, so that its pose does not become a quaternion, which rounds. Meshes are oriented, with half edges: then
-//! a mesh knows its inside, and whether it closes. Pairs of triangles are those of `leaf_pairs` that `intersection_test` confirms.
+//! The runner places the corners of B itself, because a pose of parry3d is a quaternion, which rounds. Meshes are oriented,
+//! which `contains_local_point` needs, and have half edges, which tell whether a mesh closes. Pairs of triangles are those of
+//! `leaf_pairs` that `intersection_test` confirms. Meshes that overlap themselves are not claimed, because the nearest triangle
+//! does not tell what is inside them.
 
 use parry3d_f64::bounding_volume::BoundingVolume;
 use parry3d_f64::math::{Pose, Vector};
@@ -13,7 +15,7 @@ use std::io::{BufRead, Write, stdin, stdout};
 
 const AT: Pose = Pose::IDENTITY;
 
-/// A field as numbers, or the reason why it holds none.
+/// Returns the finite numbers of a field.
 fn numbers(message: &Value, key: &str) -> Result<Vec<f64>, String> {
     let list = message[key].as_array().ok_or("expected a list")?;
     list.iter().map(|x| x.as_f64().ok_or("expected finite numbers".into())).collect()
@@ -32,7 +34,7 @@ fn mesh(message: &Value) -> Result<TriMesh, String> {
     if triangles.iter().flatten().any(|&i| i as usize >= corners.len()) {
         return Err("an index beyond the corners".into());
     }
-    // The inside of an oriented mesh is behind its triangles, so one of negative volume is turned round.
+    // The inside of an oriented mesh is behind its triangles, so a mesh of negative volume is turned inside out.
     let volume: f64 =
         triangles.iter().map(|t| t.map(|i| corners[i as usize])).map(|[p, q, r]| p.dot(q.cross(r))).sum();
     if volume < 0.0 {
@@ -42,7 +44,7 @@ fn mesh(message: &Value) -> Result<TriMesh, String> {
         .map_err(|e| e.to_string())
 }
 
-/// B with its corners at R x + t.
+/// Returns B with its corners at R x + t.
 fn placed(b: &TriMesh, pose: &[f64]) -> Result<TriMesh, String> {
     let row = |i: usize, p: &Vector| {
         pose[4 * i] * p.x + pose[4 * i + 1] * p.y + pose[4 * i + 2] * p.z + pose[4 * i + 3]
