@@ -23,11 +23,8 @@ pub(super) const QUESTIONS: [&str; 12] = [
     "self_contacts",
 ];
 
-/// The fields of an answer.
-pub(super) struct Answered(pub(super) Record);
-
-/// Answers a question, or says why it has no answer.
-pub(super) fn ask(question: &Question, meshes: &Meshes, querier: &mut Querier) -> Result<Answered, String> {
+/// Returns the fields of the answer of a question, or says why it has none.
+pub(super) fn ask(question: &Question, meshes: &Meshes, querier: &mut Querier) -> Result<Record, String> {
     let a = meshes.get(&question.a)?;
     let b = || meshes.get(question.b.as_deref().unwrap_or_default());
     let pose = || pose("pose", question.pose);
@@ -105,7 +102,7 @@ pub(super) fn ask(question: &Question, meshes: &Meshes, querier: &mut Querier) -
         }
         other => return Err(format!("expected one of {}, found {other:?}", QUESTIONS.join(", "))),
     };
-    Ok(Answered(answer))
+    Ok(answer)
 }
 
 fn yes_or_no(answer: Result<bool, QueryError>) -> Result<Record, String> {

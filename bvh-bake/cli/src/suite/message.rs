@@ -7,7 +7,7 @@ use serde::Deserialize;
 #[serde(untagged)]
 pub(super) enum Message {
     /// The first line.
-    Hello(#[allow(dead_code, reason = "only its form matters")] Hello),
+    Hello(Hello),
     /// A mesh, which later lines name.
     Mesh(MeshMessage),
     /// A question about meshes that were sent.
@@ -17,8 +17,13 @@ pub(super) enum Message {
 /// The greeting, with the version of the protocol.
 #[derive(Debug, Deserialize)]
 pub(super) struct Hello {
-    #[allow(dead_code, reason = "there is only one version")]
-    hello: u32,
+    pub(super) hello: u32,
+}
+
+/// What of a question is read if its other fields are not as they should be.
+#[derive(Debug, Deserialize)]
+pub(super) struct Numbered {
+    pub(super) id: u64,
 }
 
 /// A mesh and its name.

@@ -10,11 +10,10 @@ mod message;
 
 use crate::asking;
 use crate::console::{Failure, Record, record};
-use ask::Answered;
 use bvh_query::Querier;
 use clap::Args;
 use meshes::Meshes;
-use message::Message;
+use message::{Hello, Message, Numbered};
 use std::io::{BufRead as _, Write as _};
 
 const HELP: &str = "\
@@ -34,6 +33,9 @@ pub(crate) struct SuiteArguments {
     isa: String,
 }
 
+/// The version of the protocol.
+const PROTOCOL: u32 = 1;
+
 /// The greatest error of a distance that the command claims, as a fraction of the largest coordinate of the question: 45
 /// roundings. bvh-query measures the closest triangles in f64, so a distance far below their size has fewer digits. The bounds
 /// that come with each distance are certified, and the suite checks them exactly.
@@ -44,9 +46,9 @@ pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
     let mut querier = Querier::with_backend(asking::backend(&arguments.isa)?);
     let mut meshes = Meshes::default();
     let mut output = std::io::stdout().lock();
-    for line in std::io::stdin().lock().lines() {
+    for line in std::io::stdin().lock().split(b'\n') {
         let line = line.map_err(|error| Failure::System(format!("standard input: cannot read: {error}")))?;
-        if line.trim().is_empty() {
+        if line.trim_ascii().is_empty() {
             continue;
         }
         let answer = answer(&line, &mut meshes, &mut querier);
@@ -58,9 +60,12 @@ pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
 }
 
 /// Answers one line.
-fn answer(line: &str, meshes: &mut Meshes, querier: &mut Querier) -> Record {
-    match serde_json::from_str(line) {
-        Ok(Message::Hello(_)) => hello(),
+fn answer(line: &[u8], meshes: &mut Meshes, querier: &mut Querier) -> Record {
+    match serde_json::from_slice(line) {
+        Ok(Message::Hello(Hello { hello: PROTOCOL })) => hello(),
+        Ok(Message::Hello(Hello { hello })) => {
+            refusal(&format!("expected version {PROTOCOL} of the protocol, found {hello}"))
+        }
         Ok(Message::Mesh(mesh)) => match meshes.add(&mesh) {
             Ok(triangles) => record! { mesh: mesh.mesh, triangles: triangles },
             Err(reason) => record! { mesh: mesh.mesh }.with(refusal(&reason)),
@@ -68,18 +73,24 @@ fn answer(line: &str, meshes: &mut Meshes, querier: &mut Querier) -> Record {
         Ok(Message::Question(question)) => {
             let id = record! { id: question.id };
             match ask::ask(&question, meshes, querier) {
-                Ok(Answered(answer)) => id.with(answer),
+                Ok(answer) => id.with(answer),
                 Err(reason) => id.with(refusal(&reason)),
             }
         }
-        Err(error) => refusal(&format!("expected a line of the protocol, found {error}")),
+        Err(error) => {
+            let refusal = refusal(&format!("expected a line of the protocol, found {error}"));
+            match serde_json::from_slice(line) {
+                Ok(Numbered { id }) => record! { id: id }.with(refusal),
+                Err(_) => refusal,
+            }
+        }
     }
 }
 
 /// States what the command claims.
 fn hello() -> Record {
     record! {
-        hello: 1,
+        hello: PROTOCOL,
         name: "cbvh",
         version: env!("CARGO_PKG_VERSION"),
         settings: "meshes baked in memory with the default options",
@@ -104,13 +115,18 @@ mod tests {
     #[test]
     fn every_line_gets_an_answer() {
         let (mut meshes, mut querier) = (Meshes::default(), Querier::new().unwrap());
-        let mut ask = |line: &str| answer(line, &mut meshes, &mut querier).to_string();
+        let mut ask = |line: &str| answer(line.as_bytes(), &mut meshes, &mut querier).to_string();
         assert!(ask(r#"{"hello": 1}"#).starts_with(r#"{"hello":1,"name":"cbvh""#));
         for line in
             ["", "{", "[]", "{}", r#"{"id": 1}"#, r#"{"mesh": 3}"#, r#"{"id": 1, "ask": "age", "a": "t"}"#]
         {
             assert!(ask(line).contains(r#""refused":true"#), "{line}");
         }
+        // A question whose fields are wrong keeps its number, and the next line is read in any case.
+        let malformed = ask(r#"{"id": 5, "ask": "side", "a": "t", "point": "here"}"#);
+        assert!(malformed.starts_with(r#"{"id":5,"refused":true,"#), "{malformed}");
+        let later = ask(r#"{"hello": 2}"#);
+        assert!(later.contains("expected version 1"), "{later}");
         let triangle =
             r#"{"mesh": "t", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}"#;
         assert_eq!(ask(triangle), r#"{"mesh":"t","triangles":1}"#);
@@ -132,10 +148,10 @@ mod tests {
             let line = format!(
                 r#"{{"mesh": "m", "vertices": [{corner}, [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [{triangle}]}}"#
             );
-            let refused = answer(&line, &mut meshes, &mut querier).to_string();
+            let refused = answer(line.as_bytes(), &mut meshes, &mut querier).to_string();
             assert!(refused.contains(r#""refused":true"#), "{refused}");
             let asked = r#"{"id": 1, "ask": "side", "a": "m", "point": [0, 0, 0]}"#;
-            let refused = answer(asked, &mut meshes, &mut querier).to_string();
+            let refused = answer(asked.as_bytes(), &mut meshes, &mut querier).to_string();
             assert!(refused.contains(r#""refused":true"#), "{refused}");
         }
     }
