@@ -8,7 +8,7 @@ use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Distance, Pose, Querier, Shape, Tracker};
 use cbvh_testkit::damage::place_in_file;
 use common::asked::victims;
-use common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
+use common::shapes::{comb, cube, dirty, moved, outward, plate, soup, sphere, terrain, torus};
 use common::{Random, Triangle, bake, baked, mesh, options, queriers, rotation, translation};
 
 const LOSSLESS: [TriangleEncoding; 2] = [TriangleEncoding::F32, TriangleEncoding::Packed];
@@ -106,12 +106,14 @@ fn walks_with_jumps_in_all_profiles_and_encodings_on_all_backends() {
 fn walks_of_solids_around_and_into_each_other() {
     let mut random = Random::new(6);
     for querier in &mut queriers() {
-        let bowl = bake(&mesh(&torus(48, 32)), &options(Profile::Dop14U8, TriangleEncoding::Packed));
-        let ball = bake(&mesh(&sphere(3)), &options(Profile::Dop14U8, TriangleEncoding::Packed));
-        let (bowl, ball) = (bowl.all().solid().unwrap(), ball.all().solid().unwrap());
-        let mut trackers = Trackers::default();
+        let [ball, cube] = [outward(sphere(3)), outward(cube())]
+            .map(|of| bake(&mesh(&of), &options(Profile::Dop14U8, TriangleEncoding::Packed)));
+        let (ball, cube) = (ball.all().solid().unwrap(), cube.all().solid().unwrap());
+        let mut trackers = [(); 2].map(|()| Trackers::default());
         for (step, pose) in walk(&mut random, 400).iter().enumerate() {
-            trackers.check(querier, bowl, ball, pose, &format!("{} {step}", querier.backend()));
+            let what = format!("{} {step}", querier.backend());
+            trackers[0].check(querier, ball, cube, pose, &what);
+            trackers[1].check(querier, ball, ball, pose, &what);
         }
     }
 }
