@@ -32,7 +32,7 @@ fn write(slabs: &NodeSlabs, count: usize, turning: Option<TurningSlab>) -> [f32;
 /// The fixed directions of the format, three numbers for each.
 #[wasm_bindgen]
 pub fn directions() -> Float64Array {
-    Float64Array::from(&DIRECTIONS.map(|direction| direction.map(f64::from)).as_flattened()[..])
+    Float64Array::from(DIRECTIONS.map(|direction| direction.map(f64::from)).as_flattened())
 }
 
 /// The nodes of a level, at most `most` of them: for each, 31 numbers in the frame of its object, the object, the page and the slot
