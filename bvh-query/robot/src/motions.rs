@@ -106,9 +106,9 @@ impl Robot {
 
     /// Returns whether a motion is free, and otherwise what touches first, and when.
     ///
-    /// Cost: that of [`Robot::is_edge_free`], and of [`Querier::motion`](bvh_query::Querier::motion) for each pair that is not free. Links
-    /// that slide along each other, less than the tolerance apart, take long, since each moment is undecided: allow their contact, or
-    /// give a larger tolerance.
+    /// Cost: that of [`Robot::is_edge_free`], and of [`Querier::motion`](bvh_query::Querier::motion) for each pair that is not free, up
+    /// to the first hit that is known. Links that slide along each other until then, less than the tolerance apart, take long, since each
+    /// moment is undecided: allow their contact, or give a larger tolerance.
     ///
     /// # Errors
     /// The errors of [`Robot::is_free`].
@@ -156,6 +156,8 @@ impl Robot {
 const LITTLE_BENT: f64 = 0.25;
 /// The fastest turn of a joint, in radians per motion. What a motion costs is proportional to it.
 const MAX_TURN: f64 = 16384.0;
+/// The number of intervals at whose ends a first hit is looked for, to end the search for earlier ones there.
+const SAMPLES: u32 = 8;
 /// The most intervals that are halved before all of the motion is left to the querier, which keeps fewer intervals in memory.
 const MOST_HALVED: u32 = 1 << 12;
 /// More than what [`MotionOptions`] takes for a tolerance, as a part of the radius of the larger ball: a millionth of a diagonal, which
@@ -182,7 +184,8 @@ impl Asker {
         }
         for pair in &setting.pairs {
             let path = PairPath::new(setting, pair, edge)?;
-            let free = self.is_pair_free(&path, options).map_err(|source| failed(setting, pair, source))?;
+            let free =
+                self.is_pair_free(&path, 1.0, options).map_err(|source| failed(setting, pair, source))?;
             if !free {
                 return Ok(false);
             }
@@ -190,15 +193,20 @@ impl Asker {
         Ok(true)
     }
 
-    /// Returns whether B stays farther from A than the clearance. An interval is free if what separates both in its middle is more
+    /// Returns whether B stays farther from A than the clearance, until a time. An interval is free if what separates both in its middle is more
     /// than B moves on the way there: seen from the balls around both, or else from the shapes. Others are halved, until the bound
     /// of the sagitta decides, which is the better one for short intervals.
-    fn is_pair_free(&mut self, path: &PairPath<'_>, options: &MotionOptions) -> Result<bool, QueryError> {
+    fn is_pair_free(
+        &mut self,
+        path: &PairPath<'_>,
+        until: f64,
+        options: &MotionOptions,
+    ) -> Result<bool, QueryError> {
         let (a, b) = (path.a, path.b);
         let size = a.radius.min(b.radius);
         let limit =
             options.clearance + options.tolerance.unwrap_or(DEFAULT_TOLERANCE * a.radius.max(b.radius));
-        let mut todo = VecDeque::from([[0.0, 1.0]]);
+        let mut todo = VecDeque::from([[0.0, until]]);
         let mut halved = 0;
         while let Some([t0, t1]) = todo.pop_front() {
             let (middle, bound) = path.follow(b.middle, b.radius, [t0, t1]);
@@ -215,7 +223,8 @@ impl Asker {
                 if is_near {
                     halved += 1;
                     if halved == MOST_HALVED {
-                        return self.querier.is_free(&a.shape, &b.shape, path, options);
+                        let whole = Interval { path, ends: [0.0, until] };
+                        return self.querier.is_free(&a.shape, &b.shape, &whole, options);
                     }
                     todo.extend([[t0, at], [at, t1]]);
                 }
@@ -231,6 +240,29 @@ impl Asker {
         Ok(true)
     }
 
+    /// Returns a time at which a pair is within the clearance, and the pair: the earliest of some.
+    fn sampled_hit(
+        &mut self,
+        setting: &Setting,
+        edge: &Edge,
+        options: &MotionOptions,
+    ) -> Result<Option<(f64, usize)>, RobotError> {
+        let paths: Result<Vec<_>, _> =
+            setting.pairs.iter().map(|pair| PairPath::new(setting, pair, edge)).collect();
+        let paths = paths?;
+        for sample in 0..=SAMPLES {
+            let time = f64::from(sample) / f64::from(SAMPLES);
+            for (number, path) in paths.iter().enumerate() {
+                let near =
+                    self.querier.within(&path.a.shape, &path.b.shape, &path.pose(time), options.clearance);
+                if near.map_err(|source| failed(setting, &setting.pairs[number], source))? {
+                    return Ok(Some((time, number)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
     fn motion(
         &mut self,
         setting: &Setting,
@@ -240,29 +272,47 @@ impl Asker {
         check(setting, edge)?;
         // Pairs that stay apart would not refuse them.
         options.check()?;
-        let (mut free_until, mut first): (f64, Option<(bool, f64, usize)>) = (1.0, None);
+        // Once a hit is known, nothing later matters.
+        let (mut free_until, mut hit, mut near) = (1.0f64, None, None);
+        let mut until = 1.0;
         for (number, pair) in setting.pairs.iter().enumerate() {
             let path = PairPath::new(setting, pair, edge)?;
             let failed = |source| failed(setting, pair, source);
-            if self.is_pair_free(&path, options).map_err(failed)? {
+            if self.is_pair_free(&path, until, options).map_err(failed)? {
                 continue;
             }
-            let answer = self.querier.motion(&path.a.shape, &path.b.shape, &path, options);
-            let (free, found) = match answer.map_err(failed)? {
-                MotionAnswer::Free => continue,
-                MotionAnswer::Hit { free_until, touching_at, .. } => {
-                    (free_until, (true, touching_at, number))
+            if hit.is_none() && near.is_none() {
+                hit = self.sampled_hit(setting, edge, options)?;
+                until = hit.map_or(until, |(time, _)| time);
+            }
+            if until == 0.0 {
+                free_until = 0.0;
+                break;
+            }
+            let part = Interval { path: &path, ends: [0.0, until] };
+            // Rounded, a time may be a little later than what the search has found.
+            let earlier = |t| part.time(t).next_down().max(0.0);
+            match self.querier.motion(&path.a.shape, &path.b.shape, &part, options).map_err(failed)? {
+                MotionAnswer::Free => {}
+                MotionAnswer::Hit { free_until: free, touching_at, .. } => {
+                    free_until = free_until.min(earlier(free));
+                    if part.time(touching_at) < until || hit.is_none() {
+                        until = part.time(touching_at);
+                        hit = Some((until, number));
+                    }
                 }
-                MotionAnswer::Near { free_until, at, .. } => (free_until, (false, at, number)),
-            };
-            free_until = free_until.min(free);
-            // A hit counts before what is only near, however early that is, because it is certain.
-            let order = |of: &(bool, f64, usize)| (!of.0, of.1);
-            if first.as_ref().is_none_or(|held| order(&found) < order(held)) {
-                first = Some(found);
+                MotionAnswer::Near { free_until: free, at, .. } => {
+                    free_until = free_until.min(earlier(free));
+                    let at = part.time(at);
+                    if near.is_none_or(|(held, _)| at < held) {
+                        near = Some((at, number));
+                    }
+                }
             }
         }
-        let Some((is_hit, time, number)) = first else { return Ok(RobotMotion::Free) };
+        // A hit counts before what is only near, however early that is, because it is certain.
+        let is_hit = hit.is_some();
+        let Some((time, number)) = hit.or(near) else { return Ok(RobotMotion::Free) };
         let (joints, bodies) = (at(&setting.model, edge, time), bodies(setting, number));
         self.place(setting, &joints)?;
         let nearest = self.distance(setting, &setting.pairs[number])?;

@@ -147,7 +147,8 @@ pub(crate) struct Interval<'a> {
 }
 
 impl Interval<'_> {
-    fn time(&self, t: f64) -> f64 {
+    /// Returns the time of the path.
+    pub(crate) fn time(&self, t: f64) -> f64 {
         if t == 1.0 { self.ends[1] } else { self.ends[0] + t * (self.ends[1] - self.ends[0]) }
     }
 }

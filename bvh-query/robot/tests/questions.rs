@@ -8,13 +8,17 @@ use cbvh_testkit::Random;
 use std::path::Path;
 
 fn arm(base: Base) -> Robot {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/robot/robot.urdf");
-    let mut robot = Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap();
+    let mut robot = arm_with_all_pairs(base);
     for (a, b) in [("base", "turret"), ("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "hand")]
     {
         robot.allow(a, b).unwrap();
     }
     robot
+}
+
+fn arm_with_all_pairs(base: Base) -> Robot {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/robot/robot.urdf");
+    Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
 }
 
 fn block(sides: [f64; 3]) -> OwnedShape {
@@ -176,6 +180,17 @@ fn what_is_between_samples_is_found() {
     robot.remove("sheet").unwrap();
     assert!(robot.is_free(&from, &to).unwrap());
     assert_eq!(robot.first_hit([&from[..], &to[..], &from[..]], &MotionOptions::new()).unwrap(), None);
+}
+
+/// Base and turret slide along each other less than the tolerance apart, so that each of their moments is undecided. None of them
+/// matters, since turret and upper arm touch from the start.
+#[test]
+fn a_hit_at_the_start_ends_the_search() {
+    let mut robot = arm_with_all_pairs(Base::Fixed);
+    let edge = Edge::straight(&[0.0; 4], &[3.0, 2.0, 2.5, 1.0]).unwrap();
+    let found = robot.motion(&edge, &MotionOptions::new()).unwrap();
+    let RobotMotion::Hit { free_until, touching_at, bodies, .. } = found else { panic!("{found:?}") };
+    assert_eq!((free_until, touching_at, bodies), (0.0, 0.0, ["turret", "upper_arm"].map(str::to_string)));
 }
 
 /// Binomials of a thousand are beyond all numbers of `f64`, and no bound may be lost with them.
