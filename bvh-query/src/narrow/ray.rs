@@ -158,7 +158,7 @@ impl Ray {
     #[inline(never)]
     fn exact_crossing_of_plane(&self, triangle: &Triangle, feature: Feature) -> Option<Crossing> {
         let t = self.parameter_of_plane(triangle);
-        // Only where a damaged file has corners that are not finite, the signs of the sides and of the slope disagree.
+        // The denominator is 0 only if corners are not finite, as in a damaged file: finite ones have sides that add up to it.
         let is_number = t.denominator != BigInt::ZERO;
         (is_number && t.numerator.sign() != Sign::Minus).then(|| t.crossing(feature))
     }

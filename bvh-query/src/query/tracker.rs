@@ -274,8 +274,8 @@ impl Tracker {
     }
 
     /// Asks whether meshes that are more than `beyond` apart have room for several more motions as long as the last
-    /// one, `moved`. This takes at most as many visits as the query did, and its errors do not matter: what the query asks after
-    /// that has the rest of its budget.
+    /// one, `moved`. This takes at most as many visits as the query did, and its errors do not matter. The rest of the budget is
+    /// left for what the query asks after it.
     fn look_ahead(
         &mut self,
         querier: &mut Querier,
