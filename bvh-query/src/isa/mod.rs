@@ -175,17 +175,6 @@ pub(crate) trait Isa: Copy {
     fn load4(self, from: &[f32; 4]) -> Self::H;
     fn store4(self, value: Self::H, to: &mut [f32; 4]);
 
-    /// Moves the elements whose bits are set to the front, in order; the elements after them have no meaning.
-    #[inline(always)]
-    fn compress(self, mask: u16, from: &[u32; 16], to: &mut [u32; 16]) {
-        let (mut mask, mut at) = (mask, 0);
-        while mask != 0 {
-            to[at & 15] = from[mask.trailing_zeros() as usize & 15];
-            mask &= mask - 1;
-            at += 1;
-        }
-    }
-
     /// The lane of the least of the elements whose bits are set, none of which is NaN; of equal ones, the first. Without any
     /// bit set, no lane: 16 or more.
     #[inline(always)]

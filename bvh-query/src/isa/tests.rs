@@ -3,7 +3,7 @@
 
 use super::{Backend, Isa, Lanes, Task};
 use crate::file::unpack::unpack;
-use crate::traverse::decode::decode_group;
+use crate::traverse::decode::{Parent, decode_group};
 use bvh_format::decode::decode_child;
 use bvh_format::leaf::{Packet, TriangleEncoding, decode_packet, encode_block};
 use bvh_format::profile::Profile;
@@ -31,7 +31,7 @@ impl Task for Decode<'_> {
             isa,
             (self.profile, self.scale),
             (self.treelet, self.part),
-            (self.parent, self.column),
+            Parent::Node(self.parent, self.column),
             &mut out,
         );
         out

@@ -345,6 +345,8 @@ impl Finalists<'_> {
 
 impl Visitor for Nearest<'_> {
     const MEASURE: Measure = Measure::Distance;
+    const MAY_BE_BEST_FIRST: bool = true;
+    const HAS_WITNESS: bool = true;
 
     fn order(&self) -> Order {
         // Other orders may visit a pair of leaves twice, and each pair is told of once.

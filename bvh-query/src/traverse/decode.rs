@@ -3,17 +3,16 @@
 use crate::isa::{Isa, Lanes};
 use bvh_format::profile::Profile;
 use bvh_format::quantize::{STEP_U4, STEP_U8};
-use bvh_format::slabs::Group;
+use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::SHORT_TREELET_BYTES;
 
 /// The predictor-corrector over `$quads` registers of lower and of upper ends. `$unit` is the unit of
 /// the codes, given the parent's ends; `$codes` the codes of register `$q`. A macro, because a
 /// closure may not be inlined, and what is not inlined into a backend's function lacks its features.
 macro_rules! quads {
-    ($isa:ident, $parent:ident, $column:ident, $out:ident, $quads:literal, $unit:expr, |$q:ident| $codes:expr) => {
+    ($isa:ident, $parent:ident, $out:ident, $quads:literal, $unit:expr, |$q:ident| $codes:expr) => {
         for $q in 0..$quads {
-            let parent_lo = $isa.quad_splat($isa.load(&$parent.lo[$q]), $column);
-            let parent_hi = $isa.quad_splat($isa.load(&$parent.hi[$q]), $column);
+            let (parent_lo, parent_hi) = $parent.ends($isa, $q);
             let unit = $unit.of($isa, parent_lo, parent_hi);
             // The products are exact, so that fusing them or not gives the same bits.
             let (code_lo, code_hi) = $codes;
@@ -42,14 +41,39 @@ impl<V: Lanes> Unit<V> {
     }
 }
 
-/// Decodes children `4 * part ..` of a treelet into `out`. Column `column` of `parent` holds the
-/// parent's decoded slabs. Elements beyond the profile's rows and children hold nothing of meaning.
+/// Where the slabs of a treelet's parent are.
+#[derive(Clone, Copy)]
+pub(crate) enum Parent<'a> {
+    /// A decoded node: this column of a group.
+    Node(&'a Group, usize),
+    /// A root of a page.
+    Anchor(&'a NodeSlabs),
+}
+
+impl Parent<'_> {
+    /// Returns four rows of lower ends and of upper ends, each repeated for four children.
+    #[inline(always)]
+    pub(super) fn ends<I: Isa>(self, isa: I, q: usize) -> (I::V, I::V) {
+        match self {
+            Self::Node(group, column) => {
+                let (lo, hi) = (isa.load(&group.lo[q]), isa.load(&group.hi[q]));
+                (isa.quad_splat(lo, column), isa.quad_splat(hi, column))
+            }
+            Self::Anchor(slabs) => {
+                (isa.repeat(&slabs.lo.as_chunks().0[q]), isa.repeat(&slabs.hi.as_chunks().0[q]))
+            }
+        }
+    }
+}
+
+/// Decodes children `4 * part ..` of a treelet into `out`. Elements beyond the profile's rows and children hold nothing
+/// of meaning.
 #[inline(always)]
 pub(crate) fn decode_group<I: Isa>(
     isa: I,
     (profile, object_scale): (Profile, f32),
     (treelet, part): (&[u8], usize),
-    (parent, column): (&Group, usize),
+    parent: Parent<'_>,
     out: &mut Group,
 ) {
     let scale = Unit::Fixed(isa.splat(object_scale));
@@ -58,43 +82,43 @@ pub(crate) fn decode_group<I: Isa>(
     match profile {
         Profile::Dop14U8 if is_short => {
             let t: &[u8; 32] = fixed(treelet, 0);
-            quads!(isa, parent, column, out, 2, u8_step, |q| {
+            quads!(isa, parent, out, 2, u8_step, |q| {
                 (isa.short_codes_low(fixed(t, 16 * q)), isa.short_codes_high(fixed(t, 16 * q)))
             });
         }
         Profile::Dop6U8 if is_short => {
             let t: &[u8; 16] = fixed(treelet, 16 * part);
-            quads!(isa, parent, column, out, 1, u8_step, |q| {
+            quads!(isa, parent, out, 1, u8_step, |q| {
                 (isa.short_codes_low(fixed(t, 16 * q)), isa.short_codes_high(fixed(t, 16 * q)))
             });
         }
         Profile::Dop14U8 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            quads!(isa, parent, column, out, 2, u8_step, |q| {
+            quads!(isa, parent, out, 2, u8_step, |q| {
                 (isa.codes_u8(fixed(t, 16 * q)), isa.codes_u8(fixed(t, 32 + 16 * q)))
             });
         }
         Profile::Dop6U8 => {
             let t: &[u8; 32] = fixed(treelet, 32 * part);
-            quads!(isa, parent, column, out, 1, u8_step, |q| {
+            quads!(isa, parent, out, 1, u8_step, |q| {
                 (isa.codes_u8(fixed(t, 32 * q)), isa.codes_u8(fixed(t, 16 + 32 * q)))
             });
         }
         Profile::Dop6F16 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            quads!(isa, parent, column, out, 1, scale, |q| {
+            quads!(isa, parent, out, 1, scale, |q| {
                 (isa.codes_f16(fixed(t, 64 * q)), isa.codes_f16(fixed(t, 32 + 64 * q)))
             });
         }
         Profile::Dop26U4 => {
             let t: &[u8; 64] = fixed(treelet, 0);
-            quads!(isa, parent, column, out, 4, u4_step, |q| {
+            quads!(isa, parent, out, 4, u4_step, |q| {
                 (isa.codes_low(fixed(t, 16 * q)), isa.codes_high(fixed(t, 16 * q)))
             });
         }
         Profile::Dop26U8Wide => {
             let t: &[u8; 128] = fixed(treelet, 0);
-            quads!(isa, parent, column, out, 4, u8_step, |q| {
+            quads!(isa, parent, out, 4, u8_step, |q| {
                 (isa.codes_u8(fixed(t, 16 * q)), isa.codes_u8(fixed(t, 64 + 16 * q)))
             });
         }

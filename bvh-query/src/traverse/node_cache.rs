@@ -7,7 +7,7 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
-use crate::traverse::decode::decode_group;
+use crate::traverse::decode::{Parent, decode_group};
 use crate::traverse::node_filter::Reach;
 use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
@@ -66,6 +66,29 @@ pub(crate) struct CachedNode {
     links: Links,
     page: u32,
     pub(crate) count: usize,
+    /// The lanes of the children in tests of 16 pairs, by group.
+    pub(crate) lanes: [ChildLanes; 2],
+}
+
+/// The lanes in which four children take part in a test of 16 pairs: as children of A, and as children of B.
+#[derive(Clone, Copy)]
+pub(crate) struct ChildLanes {
+    /// Of all children.
+    pub(crate) all: [u16; 2],
+    /// Of leaf packets.
+    pub(crate) leaves: [u16; 2],
+}
+
+impl ChildLanes {
+    const NONE: Self = Self { all: [0; 2], leaves: [0; 2] };
+
+    /// `children` and `leaves` have a bit for each of four children.
+    #[inline(always)]
+    fn new(children: u16, leaves: u16) -> Self {
+        // Each bit to the first lane of its row, then to all of them.
+        let rows = |bits: u16| 15 * ((bits | bits << 3 | bits << 6 | bits << 9) & 0x1111);
+        Self { all: [rows(children), 0x1111 * children], leaves: [rows(leaves), 0x1111 * leaves] }
+    }
 }
 
 /// Stands for the number of a node that has not been opened.
@@ -80,6 +103,7 @@ impl CachedNode {
         links: Links::NONE,
         page: 0,
         count: 0,
+        lanes: [ChildLanes::NONE; 2],
     };
 
     /// Returns the child, if it is a leaf packet.
@@ -91,12 +115,6 @@ impl CachedNode {
     #[inline(always)]
     pub(crate) fn is_leaf(&self, child: usize) -> bool {
         self.links.kinds >> (4 * child + 2) & 1 == 1
-    }
-
-    /// Returns a bit for each of four children, set for leaf packets.
-    #[inline(always)]
-    pub(crate) fn leaves(&self, part: usize) -> u16 {
-        leaf_lanes(&self.links, part)
     }
 
     /// Computes the extents, after the slabs have been decoded.
@@ -156,8 +174,9 @@ pub(crate) struct NodeCache {
 const MAX_TREELETS_PER_PAGE: usize = 124;
 /// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
 const MAX_NODES: usize = 1 << 29;
-/// With more nodes than this, the next walk starts anew. They take 300 KiB, less than the second-level cache of a core.
-const MAX_KEPT_NODES: usize = 256;
+/// With more nodes than this, the next walk starts anew. What a walk reads of so many nodes with four children takes 300 KiB,
+/// less than the second-level cache of a core.
+const MAX_KEPT_NODES: usize = 512;
 
 impl NodeCache {
     /// Starts a walk of an object. Nodes of the same object stay from the walk before, unless there are many. Returns
@@ -181,6 +200,7 @@ impl NodeCache {
             root.extents[0] = f32::INFINITY;
             root.opened = [CLOSED; 8];
             root.count = 1;
+            root.lanes = [ChildLanes::new(1, 0), ChildLanes::NONE];
             self.used = 1;
             self.max_nodes = max_nodes(object);
         }
@@ -287,6 +307,10 @@ fn decode_node<I: Isa>(
     }
     to.page = opened.page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
+    for part in 0..2 {
+        let children = (1u16 << to.count.saturating_sub(4 * part).min(4)) - 1;
+        to.lanes[part] = ChildLanes::new(children, leaf_lanes(&to.links, part));
+    }
     to.opened = [CLOSED; 8];
     to.measure(isa, profile.groups());
     Ok(())
@@ -310,20 +334,20 @@ pub(super) fn open_child<'a, I: Isa>(
     to: &mut [Group; 2],
 ) -> Result<Option<Opened<'a>>, QueryError> {
     let (at, slot, anchor);
-    let (slabs, column) = match links.child(child) {
+    let decoded = (&groups[(child / 4) & 1], child % 4);
+    let parent = match links.child(child) {
         Child::Treelet(place) => {
             at = bvh.page(object, page)?;
             slot = place;
-            (&groups[(child / 4) & 1], child % 4)
+            Parent::Node(decoded.0, decoded.1)
         }
         Child::Remote(link) => {
             (at, slot) = cross(bvh, object, page, link)?;
-            anchor = spread(isa, &at.anchor_slabs(slot));
-            let decoded = (&groups[(child / 4) & 1], child % 4);
+            anchor = at.anchor_slabs(slot);
             if !is_nested(isa, object.profile().directions(), decoded, &anchor) {
                 refuse(bvh, (page, link), decoded, &at, slot)?;
             }
-            (&anchor, 0)
+            Parent::Anchor(&anchor)
         }
         Child::Leaf { .. } | Child::Empty => return Ok(None),
     };
@@ -332,7 +356,7 @@ pub(super) fn open_child<'a, I: Isa>(
     let links = Links::read(profile, treelet);
     for part in 0..profile.groups() {
         let coding = (profile, object.f16_scale());
-        decode_group(isa, coding, (treelet, part), (slabs, column), &mut to[part]);
+        decode_group(isa, coding, (treelet, part), parent, &mut to[part]);
     }
     Ok(Some(Opened { links, page: at, treelet }))
 }
@@ -346,10 +370,15 @@ fn cross<'a>(bvh: &'a Bvh, object: &Object, from: u32, link: u8) -> Result<(Page
     Ok((page, to.root()))
 }
 
-/// Returns whether the slabs of an anchor, in all columns, lie within those of a column: rule 49. Roundings in all
-/// nodes are charged by the magnitudes of the object's root, which bound those of all nodes only because of this rule.
+/// Returns whether the slabs of an anchor lie within those of a column: rule 49. Roundings in all nodes are charged by the
+/// magnitudes of the object's root, which bound those of all nodes only because of this rule.
 #[inline(always)]
-fn is_nested<I: Isa>(isa: I, set: DirectionSet, (decoded, column): (&Group, usize), anchor: &Group) -> bool {
+fn is_nested<I: Isa>(
+    isa: I,
+    set: DirectionSet,
+    (group, column): (&Group, usize),
+    anchor: &NodeSlabs,
+) -> bool {
     // A bit for each lane of a row with a slab, by register.
     let rows_with_slabs: &[u16] = match set {
         DirectionSet::Dop6 => &[0x0fff],
@@ -358,10 +387,10 @@ fn is_nested<I: Isa>(isa: I, set: DirectionSet, (decoded, column): (&Group, usiz
     };
     let mut beyond = 0;
     for (q, &rows) in rows_with_slabs.iter().enumerate() {
-        let above = isa.quad_splat(isa.load(&decoded.lo[q]), column).le(isa.load(&anchor.lo[q]));
-        let below = isa.load(&anchor.hi[q]).le(isa.quad_splat(isa.load(&decoded.hi[q]), column));
+        let (lo, hi) = Parent::Node(group, column).ends(isa, q);
+        let (anchor_lo, anchor_hi) = Parent::Anchor(anchor).ends(isa, q);
         // False for NaN, which a forged file may decode to.
-        beyond |= !(I::V::bits(above) & I::V::bits(below)) & rows;
+        beyond |= !(I::V::bits(lo.le(anchor_lo)) & I::V::bits(anchor_hi.le(hi))) & rows;
     }
     beyond == 0
 }

@@ -31,7 +31,7 @@ pub(crate) struct Tested {
 }
 
 impl Tested {
-    const NONE: Self = Self { bounds: [0.0; 16], a: ChildRef::ROOT, b: ChildRef::ROOT };
+    pub(crate) const NONE: Self = Self { bounds: [0.0; 16], a: ChildRef::ROOT, b: ChildRef::ROOT };
 
     /// Returns the pair in a lane.
     #[inline(always)]

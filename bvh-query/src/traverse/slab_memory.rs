@@ -7,7 +7,7 @@ use crate::isa::{Isa, Task};
 use crate::traverse::node_cache::NodeCache;
 use crate::traverse::node_filter::{Measure, NodeFilter};
 use crate::traverse::pending::Tested;
-use crate::traverse::per_node::PerNode;
+use crate::traverse::per_node::{PerNode, PerWalk};
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_filter::{Seen, SlabFilter, TurningGroup};
 
@@ -30,7 +30,7 @@ pub(crate) struct SlabMemory {
     /// The turning slabs of opened nodes, of A and of B.
     groups: [PerNode<TurningGroup>; 2],
     /// What the other side sees of them in this walk.
-    seen: [PerNode<Seen>; 2],
+    seen: [PerWalk<Seen>; 2],
     test: Option<Box<SlabFilter>>,
     /// The walk for which `test` was prepared.
     prepared: u64,
@@ -50,6 +50,7 @@ impl SlabMemory {
     /// Starts a walk, which has a number of its own.
     pub(crate) fn start(&mut self, walk: u64, pair: &ObjectPair<'_>) {
         self.walk = walk;
+        self.seen.iter_mut().for_each(|seen| seen.start(walk));
         self.applies =
             pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
         (self.pause, self.balance, self.next_pause) = (NODE_TESTS_BEFORE_SLABS, 0, FIRST_PAUSE);
@@ -105,11 +106,11 @@ impl Task for TestSlabs<'_> {
         if !is_known {
             group_b.decode(isa, &node_b.turning, &node_b.groups[0]);
         }
-        let (seen_a, is_known) = seen_a.of(number_a, memory.walk);
+        let (seen_a, is_known) = seen_a.of(number_a);
         if !is_known {
             test.see_a(isa, group_a, seen_a);
         }
-        let (seen_b, is_known) = seen_b.of(number_b, memory.walk);
+        let (seen_b, is_known) = seen_b.of(number_b);
         if !is_known {
             test.see_b(isa, group_b, seen_b);
         }

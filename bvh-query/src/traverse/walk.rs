@@ -29,10 +29,10 @@ use crate::isa::{Isa, Task};
 use crate::traverse::budget::Budget;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
-use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
+use crate::traverse::node_cache::{CachedNode, ChildLanes, ChildRef, NodeCache};
 use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
 use crate::traverse::pending::{Entry, PendingTests};
-use crate::traverse::per_node::PerNode;
+use crate::traverse::per_node::PerWalk;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
 #[cfg(feature = "trace")]
@@ -69,6 +69,12 @@ pub(crate) trait Visitor {
         [0.0; 3]
     }
 
+    /// Whether `order` may be `Order::Best`.
+    const MAY_BE_BEST_FIRST: bool = false;
+
+    /// Whether `witness` returns anything.
+    const HAS_WITNESS: bool = false;
+
     /// Returns a direction in A's frame, at most 1 long, along which A and B are likely apart.
     fn witness(&self) -> Option<[f32; 3]> {
         None
@@ -103,7 +109,7 @@ enum Phase {
 const MAX_LISTED_TESTS: usize = 256;
 
 /// How many pairs of leaf packets are visited together. Answers do not depend on it.
-const LEAF_PAIRS_PER_BATCH: usize = 4;
+const LEAF_PAIRS_PER_BATCH: u32 = 4;
 
 /// A node this many times larger than its partner is opened alone, so that its children meet the partner at its size.
 const EXTENT_RATIO_TO_OPEN_ONE: f32 = 2.0;
@@ -124,9 +130,9 @@ pub(crate) struct PairMemory {
     nodes_a: NodeCache,
     nodes_b: NodeCache,
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    aligned_a: PerNode<[Group; 2]>,
+    aligned_a: PerWalk<[Group; 2]>,
     /// The groups of B's opened nodes along A's directions.
-    aligned_b: PerNode<[Group; 2]>,
+    aligned_b: PerWalk<[Group; 2]>,
     /// The test along turning slabs.
     slabs: SlabMemory,
     /// Depth-first: the pairs that node tests left.
@@ -271,6 +277,8 @@ impl PairMemory {
         self.large_leaves.start();
         let reach_a = self.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
         let reach_b = self.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
+        self.aligned_a.start(self.walk);
+        self.aligned_b.start(self.walk);
         self.slabs.start(self.walk, pair);
         self.node_filter.prepare(isa, pair, (reach_a, reach_b));
         if sweeps {
@@ -291,12 +299,17 @@ impl PairMemory {
 }
 
 impl<W: Visitor> PairWalk<'_, '_, W> {
+    #[inline(always)]
+    fn phase(&self) -> Phase {
+        if W::MAY_BE_BEST_FIRST { self.phase } else { Phase::DepthFirst }
+    }
+
     /// Visits pairs until none is left or the visitor breaks.
     #[inline(always)]
     fn visit_all<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
         let mut best_first_leaves = 0;
         self.memory.stack.push_one(Entry::ROOTS);
-        if self.phase == Phase::Dive {
+        if self.phase() == Phase::Dive {
             // What follows the dive starts at the roots again.
             self.memory.list.push_one(Entry::ROOTS);
         }
@@ -317,10 +330,10 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             };
             self.budget.visit()?;
             if let Some(leaves) = self.memory.leaf_pair(next) {
-                if self.visit_leaves(isa, leaves, self.phase != Phase::DepthFirst)?.is_break() {
+                if self.visit_leaves(isa, leaves, self.phase() != Phase::DepthFirst)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
-                if self.phase == Phase::BestFirst {
+                if self.phase() == Phase::BestFirst {
                     best_first_leaves += 1;
                     if matches!(self.order, Order::Best { leaves } if best_first_leaves >= leaves) {
                         self.go_on_depth_first();
@@ -333,7 +346,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             }
             let sides = self.open(isa, next)?;
             self.push_children(isa, &sides);
-            if self.phase == Phase::BestFirst && self.memory.list.len() > MAX_LISTED_TESTS {
+            if self.phase() == Phase::BestFirst && self.memory.list.len() > MAX_LISTED_TESTS {
                 self.go_on_depth_first();
             }
         }
@@ -342,7 +355,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     /// Takes the pair of least bound from the list, if it is within the limit. The stack is empty.
     #[inline(always)]
     fn least_listed<I: Isa>(&mut self, isa: I) -> Option<Entry> {
-        if self.phase == Phase::Dive {
+        if self.phase() == Phase::Dive {
             // The dive has ended at a leaf pair, or at a node none of whose children is within the limit.
             self.phase = Phase::BestFirst;
         }
@@ -362,7 +375,9 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     #[inline(always)]
     fn follow_visitor(&mut self) {
         self.limit = self.visitor.limit();
-        self.memory.node_filter.update_witness(&mut self.witness, self.visitor.witness());
+        if W::HAS_WITNESS {
+            self.memory.node_filter.update_witness(&mut self.witness, self.visitor.witness());
+        }
     }
 
     /// Visits two leaf packets.
@@ -383,8 +398,9 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     /// Visits the pairs of leaf packets that have been collected.
     #[inline(always)]
     fn visit_leaf_pairs<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
-        for at in 0..self.memory.leaf_pairs.len() {
-            let next = self.memory.leaf_pairs.get(at);
+        let mut place = (0, 0);
+        while let Some((next, after)) = self.memory.leaf_pairs.next(place) {
+            place = after;
             if next.bound > self.limit {
                 continue;
             }
@@ -419,7 +435,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     #[inline(always)]
     fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<Sides, QueryError> {
         let (pair, tests) = (&self.pair, self.tests);
-        let PairMemory { node_filter, nodes_a, nodes_b, aligned_b, walk, .. } = &mut *self.memory;
+        let PairMemory { node_filter, nodes_a, nodes_b, aligned_b, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
             node_filter.look_along_b(isa);
         }
@@ -447,7 +463,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             #[cfg(feature = "trace")]
             trace::opened(1, entry.b, number);
             (sides.node_b, sides.only_b) = (number, None);
-            let (to, is_aligned) = aligned_b.of(number, *walk);
+            let (to, is_aligned) = aligned_b.of(number);
             if !is_aligned {
                 let node = nodes_b.get(number);
                 isa.run(AlignB { node_filter, node, to, sweeps: W::SWEEPS });
@@ -459,9 +475,9 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     /// Tests all pairs of children and keeps those within the limit.
     #[inline(always)]
     fn push_children<I: Isa>(&mut self, isa: I, sides: &Sides) {
-        let (measure, phase, order) = (W::MEASURE, self.phase, self.order);
+        let (measure, phase, order) = (W::MEASURE, self.phase(), self.order);
         let (limit, leaving_limit) = (gap_limit::<W>(self.limit), self.limit);
-        let witness = &self.witness;
+        let witness = if W::HAS_WITNESS { &self.witness } else { &None };
         let PairMemory {
             node_filter,
             nodes_a,
@@ -472,7 +488,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             stack,
             leaf_pairs,
             list,
-            walk,
             ..
         } = &mut *self.memory;
         let node_filter = &**node_filter;
@@ -488,9 +503,9 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 tested.a = ChildRef::new(sides.node_a, 4 * part_a);
                 tested.b = ChildRef::new(sides.node_b, 4 * part_b);
                 let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
+                let (lanes_a, lanes_b) = (&side_a.lanes[part_a & 1], &side_b.lanes[part_b & 1]);
                 let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
-                mask &= lanes_of_a(sides.only_a, side_a.count, part_a);
-                mask &= lanes_of_b(sides.only_b, side_b.count, part_b);
+                mask &= lanes_of_a(sides.only_a, lanes_a) & lanes_of_b(sides.only_b, lanes_b);
                 if mask != 0 && slabs.are_due() {
                     let nodes = ((&*nodes_a, sides.node_a), (&*nodes_b, sides.node_b));
                     mask = isa.run(TestSlabs {
@@ -504,7 +519,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     });
                 }
                 if mask != 0 && node_filter.looks_along_b() {
-                    let (to, is_aligned) = aligned_a.of(sides.node_a, *walk);
+                    let (to, is_aligned) = aligned_a.of(sides.node_a);
                     if !is_aligned {
                         isa.run(AlignA { node_filter, node: side_a, to });
                     }
@@ -516,8 +531,8 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     mask &= node_filter.leaving(isa, groups, leaving_limit, &mut tested.bounds);
                 }
                 if phase == Phase::DepthFirst {
-                    let leaves = rows_of(side_a.leaves(part_a)) & (0x1111 * side_b.leaves(part_b));
-                    leaf_pairs.append(isa, tested, mask & leaves);
+                    let leaves = lanes_a.leaves[0] & lanes_b.leaves[1];
+                    leaf_pairs.append(tested, mask & leaves);
                     mask &= !leaves;
                 }
                 let first = match order {
@@ -546,13 +561,6 @@ fn gap_limit<W: Visitor>(limit: f32) -> f32 {
     if W::MEASURE == Measure::Leaving { 0.0 } else { limit }
 }
 
-/// Spreads a mask of four children of A to the lanes of their rows.
-#[inline(always)]
-fn rows_of(children: u16) -> u16 {
-    // Each bit to the first lane of its row; times 15 to all of them.
-    15 * ((children | children << 3 | children << 6 | children << 9) & 0x1111)
-}
-
 /// Returns the groups of four children to test: all groups, or the group of the only child to test.
 #[inline(always)]
 fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
@@ -562,20 +570,14 @@ fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
     }
 }
 
-/// Returns the lanes whose child of A exists, or is the only child to test.
+/// Returns the lanes of the children of A to test: of all, or of the only one.
 #[inline(always)]
-fn lanes_of_a(only: Option<usize>, count: usize, part: usize) -> u16 {
-    match only {
-        Some(child) => 0xf << (4 * (child % 4)),
-        None => ((1u32 << (4 * (count - 4 * part).min(4))) - 1) as u16,
-    }
+fn lanes_of_a(only: Option<usize>, lanes: &ChildLanes) -> u16 {
+    only.map_or(lanes.all[0], |child| 0xf << (4 * (child % 4)))
 }
 
-/// Returns the lanes whose child of B exists, or is the only child to test.
+/// Returns the lanes of the children of B to test.
 #[inline(always)]
-fn lanes_of_b(only: Option<usize>, count: usize, part: usize) -> u16 {
-    match only {
-        Some(child) => 0x1111 << (child % 4),
-        None => 0x1111 * ((1u16 << (count - 4 * part).min(4)) - 1),
-    }
+fn lanes_of_b(only: Option<usize>, lanes: &ChildLanes) -> u16 {
+    only.map_or(lanes.all[1], |child| 0x1111 << (child % 4))
 }

@@ -151,7 +151,7 @@ impl Isa for Avx2 {
             let both = _mm256_broadcast_ps(&_mm_loadu_ps(from.as_ptr()));
             let low = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1);
             let high = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
-            Y(_mm256_permutevar_ps(both, low), _mm256_permutevar_ps(both, high))
+            Y(permute_in_halves(both, low), permute_in_halves(both, high))
         })
     }
     #[inline(always)]
@@ -286,6 +286,22 @@ impl Isa for Avx2 {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
         unsafe { run_with_features(self, task) }
     }
+}
+
+/// `_mm256_permutevar_ps`, which compilers replace by slower shuffles across halves when they know the places.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn permute_in_halves(value: __m256, places: __m256i) -> __m256 {
+    let permuted;
+    // SAFETY: The instruction needs AVX, which the function enables. It reads and writes registers only.
+    unsafe {
+        std::arch::asm!(
+            "vpermilps {}, {}, {}",
+            out(ymm_reg) permuted, in(ymm_reg) value, in(ymm_reg) places,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    permuted
 }
 
 /// Rounds each step up to 16 significant bits.

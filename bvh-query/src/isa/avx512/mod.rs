@@ -271,13 +271,6 @@ impl Isa for Avx512 {
         with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
     }
     #[inline(always)]
-    fn compress(self, mask: u16, from: &[u32; 16], to: &mut [u32; 16]) {
-        with_features!({
-            let chosen = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(from.as_ptr().cast()));
-            _mm512_storeu_si512(to.as_mut_ptr().cast(), chosen);
-        });
-    }
-    #[inline(always)]
     fn least(self, of: &[f32; 16], mask: u16) -> u32 {
         with_features!({
             let of = _mm512_loadu_ps(of.as_ptr());
