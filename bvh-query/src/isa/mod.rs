@@ -113,14 +113,21 @@ pub(crate) enum Part {
 /// The rows to pick, in two forms: for backends that load rows, and for those that pick lanes of registers.
 #[derive(Clone, Copy)]
 pub(crate) struct FourRows<'a> {
-    /// Rows of a group; upper ends start at row 16.
-    pub(crate) rows: &'a [u32; 4],
+    /// Where rows of a group start among its 128 numbers; upper ends start at 64.
+    pub(crate) starts: &'a [u32; 4],
     /// Element `4 * i + j` is four times the place of row i in its part, plus j.
     #[cfg_attr(
         not(target_arch = "x86_64"),
         allow(dead_code, reason = "only AVX-512 picks lanes of registers")
     )]
     pub(crate) lanes: &'a [u32; 16],
+}
+
+/// Returns four rows of a group, which start at these places.
+#[inline(always)]
+fn rows_at(group: &Group, starts: [u32; 4]) -> [&[f32; 4]; 4] {
+    let numbers = group.rows().as_flattened();
+    starts.map(|start| numbers[(start & 124) as usize..].first_chunk().unwrap_or(&[0.0; 4]))
 }
 
 /// The token of a backend, and the operations that its CPU features allow.

@@ -1,7 +1,7 @@
 //! Sixteen lanes in four registers of four, for CPUs whose registers have 128 bits. A backend states what is done to one
 //! register; the rest follows.
 
-use super::{FourRows, Isa, Lanes, Part, Task};
+use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
 use bvh_format::slabs::Group;
 use std::marker::PhantomData;
 
@@ -178,10 +178,8 @@ impl<Q: Quad> Isa for Quads<Q> {
     }
     #[inline(always)]
     fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Four<Q>, Four<Q>) {
-        let rows = group.rows();
-        let [a, b, c, d] = four.rows.map(|row| (row & 31) as usize);
-        let ends = self.quads([&rows[a], &rows[b], &rows[c], &rows[d]]);
-        (ends, self.quads([&rows[a ^ 16], &rows[b ^ 16], &rows[c ^ 16], &rows[d ^ 16]]))
+        let others = four.starts.map(|start| start ^ 64);
+        (self.quads(rows_at(group, *four.starts)), self.quads(rows_at(group, others)))
     }
     #[inline(always)]
     fn round_step_up(self, step: Four<Q>) -> Four<Q> {

@@ -29,9 +29,9 @@ const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 /// have no meaning.
 #[repr(C, align(64))]
 pub(crate) struct Alignment {
-    /// Where each term's end is taken from, `[term]`, as lanes and as rows: see `FourRows`.
+    /// Where each term's end is taken from, `[term]`, as lanes and as starts of rows: see `FourRows`.
     lanes: [[[u32; 16]; 4]; 3],
-    rows: [[u32; 16]; 3],
+    starts: [[u32; 16]; 3],
     coefficients: [[[f32; 16]; 4]; 3],
     offset_lo: [[f32; 16]; 4],
     offset_hi: [[f32; 16]; 4],
@@ -85,7 +85,7 @@ const PLACES: [[u32; 64]; 3] = {
 impl Alignment {
     /// An empty alignment, before the first pose is prepared.
     pub(crate) const NONE: Self = Self {
-        rows: [[0; 16]; 3],
+        starts: [[0; 16]; 3],
         lanes: [[[0; 16]; 4]; 3],
         coefficients: [[[0.0; 16]; 4]; 3],
         offset_lo: [[0.0; 16]; 4],
@@ -146,7 +146,7 @@ impl Alignment {
             let mut first = [0.0; 16];
             for row in 0..16 {
                 let end = rows_of[row] >> (8 * term) & 31;
-                self.rows[term][row] = end;
+                self.starts[term][row] = 4 * end;
                 // The coefficients of lower ends, which have rows below 16, are negative.
                 coefficients[row] = f32::from_bits(coefficients[row].to_bits() ^ (!end & 16) << 27);
                 first[row] = f32::from_bits(4 * (places_of[row] >> (8 * term) & 15));
@@ -208,7 +208,8 @@ impl Alignment {
         for q in 0..REGISTERS {
             let (mut lo, mut hi) = (isa.load(&self.offset_lo[q]), isa.load(&self.offset_hi[q]));
             for term in 0..3 {
-                let four = FourRows { rows: &self.rows[term].as_chunks().0[q], lanes: &self.lanes[term][q] };
+                let four =
+                    FourRows { starts: &self.starts[term].as_chunks().0[q], lanes: &self.lanes[term][q] };
                 let (end, other) = isa.pick(&rows, parts[term], four);
                 let coefficients = isa.load(&self.coefficients[term][q]);
                 // Not fused, so that the ends, and with them the order of visits, are the same on every backend.

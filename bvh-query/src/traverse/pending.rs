@@ -122,6 +122,17 @@ impl PendingTests {
         Some(entry)
     }
 
+    /// Drops tests from the end until the next pair is within a limit. Each test's next pair is its nearest, so a test whose
+    /// next pair is beyond the limit has none within it.
+    #[inline(always)]
+    pub(crate) fn drop_beyond(&mut self, limit: f32) {
+        while let Some(last) = self.len.checked_sub(1)
+            && self.tests[last].bound() > limit
+        {
+            self.len = last;
+        }
+    }
+
     /// Takes the pair of least bound, if each test's next pair is its nearest. The order of the tests changes.
     #[inline(always)]
     pub(crate) fn pop_least<I: Isa>(&mut self, isa: I) -> Option<Entry> {

@@ -314,6 +314,9 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             self.memory.list.push_one(Entry::ROOTS);
         }
         loop {
+            if W::MAY_BE_BEST_FIRST && self.order != Order::Any {
+                self.memory.stack.drop_beyond(self.limit);
+            }
             let waiting = self.memory.leaf_pairs.len();
             if (waiting >= LEAF_PAIRS_PER_BATCH || waiting > 0 && self.memory.stack.is_empty())
                 && self.visit_leaf_pairs(isa)?.is_break()

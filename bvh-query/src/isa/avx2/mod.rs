@@ -3,7 +3,7 @@
 //! All `unsafe` here rests on one fact: only `detect` creates an `Avx2`, after it has found the features below on
 //! the CPU, and a `Y` or `X` can be made only with an `Avx2`.
 
-use super::{FourRows, Isa, Lanes, Part, Task};
+use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
 use bvh_format::slabs::Group;
 use bvh_format::treelet::SHORT_CODES;
 use std::arch::x86_64::*;
@@ -180,10 +180,8 @@ impl Isa for Avx2 {
     }
     #[inline(always)]
     fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Y, Y) {
-        let rows = group.rows();
-        let [a, b, c, d] = four.rows.map(|row| (row & 31) as usize);
-        let ends = self.quads([&rows[a], &rows[b], &rows[c], &rows[d]]);
-        (ends, self.quads([&rows[a ^ 16], &rows[b ^ 16], &rows[c ^ 16], &rows[d ^ 16]]))
+        let others = four.starts.map(|start| start ^ 64);
+        (self.quads(rows_at(group, *four.starts)), self.quads(rows_at(group, others)))
     }
     #[inline(always)]
     fn round_step_up(self, step: Y) -> Y {

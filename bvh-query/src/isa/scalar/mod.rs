@@ -1,6 +1,6 @@
 //! The portable backend: arrays, one element at a time. It defines the results of the other backends.
 
-use super::{FourRows, Isa, Lanes, Part, Task};
+use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
 use bvh_format::ordered::from_ordered;
 use bvh_format::quantize::round_step_up;
 use bvh_format::slabs::Group;
@@ -127,13 +127,8 @@ impl Isa for Scalar {
     }
     #[inline(always)]
     fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Array<16>, Array<16>) {
-        let (mut ends, mut others) = (Array([0.0; 16]), Array([0.0; 16]));
-        let each = ends.0.as_chunks_mut().0.iter_mut().zip(others.0.as_chunks_mut().0).zip(four.rows);
-        for ((end, other), row) in each {
-            let row = (row & 31) as usize;
-            (*end, *other) = (group.rows()[row], group.rows()[row ^ 16]);
-        }
-        (ends, others)
+        let others = four.starts.map(|start| start ^ 64);
+        (self.quads(rows_at(group, *four.starts)), self.quads(rows_at(group, others)))
     }
     #[inline(always)]
     fn round_step_up(self, step: Array<16>) -> Array<16> {
