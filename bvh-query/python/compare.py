@@ -32,8 +32,6 @@ from typing import Any, Callable, Iterator
 
 import numpy as np
 
-import cbvh
-
 Ask = Callable[[np.ndarray], Any]
 
 
@@ -60,6 +58,8 @@ def read_poses(path: pathlib.Path, limit: int) -> np.ndarray:
 
 
 def with_cbvh(a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Ask, Ask]:
+    import cbvh
+
     mesh_a, mesh_b = cbvh.bake(*a), cbvh.bake(*b)
     return lambda pose: mesh_a.collide(mesh_b, pose), lambda pose: mesh_a.distance(mesh_b, pose).distance
 
@@ -151,6 +151,8 @@ def timed(ask: Ask, poses: np.ndarray, budget: float) -> tuple[list[Any], list[i
 
 def compare(a: Any, b: Any, poses: np.ndarray, libraries: dict[str, tuple[Ask, Ask]], budget: float) -> Iterator[str]:
     """A row of the table for each mode and library."""
+    import cbvh
+
     size = float(np.linalg.norm(np.ptp(a[0], axis=0)))
     for mode, place in (("collide", 0), ("distance", 1)):
         own, own_median = np.zeros(0), 0.0
