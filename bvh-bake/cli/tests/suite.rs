@@ -126,6 +126,61 @@ fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
 }
 
 #[test]
+fn timed_questions_have_a_time_for_each_pose() {
+    let place = place();
+    let file = place.join("tetrahedron.mesh");
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].map(f32::to_le_bytes);
+    let triangles = [0_u32, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].map(u32::to_le_bytes);
+    std::fs::write(&file, [corners.as_flattened(), triangles.as_flattened()].concat()).unwrap();
+    let mesh = |triangles| json!({"mesh": "t", "file": file, "corners": 4, "triangles": triangles});
+    let asked = |a: &str, ask: &str| {
+        let poses = [at(3.0, 0.0, 0.0), at(0.5, 0.25, 0.0)];
+        json!({"id": 1, "ask": ask, "a": a, "b": "t", "poses": poses, "budget": 60.0})
+    };
+    let mut batch = asked("t", "distance");
+    batch["batch"] = json!(true);
+    let answers = talk(&[
+        mesh(4),
+        json!({"field": "f", "meshes": ["t"], "instances": [[0, at(0.0, 0.0, 0.0)], [0, at(1.0, 0.0, 0.0)]]}),
+        asked("t", "collide"),
+        asked("t", "distance"),
+        asked("t", "contacts"),
+        asked("f", "collide"),
+        asked("f", "touched"),
+        asked("f", "distance"),
+        batch,
+        asked("t", "touched"),
+        asked("f", "contacts"),
+        asked("u", "collide"),
+        mesh(5),
+        asked("t", "collide"),
+    ]);
+    assert!(
+        answers[0]["seconds"].as_f64().unwrap() > 0.0 && answers[0]["open_seconds"].as_f64().unwrap() > 0.0
+    );
+    assert!(answers[0]["bytes"].as_u64().unwrap() > 100 && answers[1]["seconds"].as_f64().is_some());
+    for (answer, expected) in answers[2..8].iter().zip([
+        Some([0.0, 1.0]),
+        Some([2.0, 0.0]),
+        None,
+        Some([0.0, 1.0]),
+        Some([0.0, 2.0]),
+        Some([1.0, 0.0]),
+    ]) {
+        assert_eq!(answer["nanoseconds"].as_array().unwrap().len(), 2, "{answer}");
+        if let Some(expected) = expected {
+            assert_eq!(answer["answers"], json!(expected));
+        }
+    }
+    assert!(answers[4]["answers"][0] == json!(0.0) && answers[4]["answers"][1].as_f64().unwrap() > 0.0);
+    assert_eq!(answers[8]["answers"], json!([2.0, 0.0]));
+    assert!(answers[8]["seconds"].as_f64().unwrap() > 0.0 && answers[8]["threads"].as_u64().unwrap() > 0);
+    for answer in &answers[9..] {
+        assert_eq!(answer["refused"], json!(true), "{answer}");
+    }
+}
+
+#[test]
 fn a_backend_that_is_unknown_is_an_error() {
     common::cbvh_in(&place(), &["suite", "--isa", "mmx"]).failed(1, &["mmx"]);
 }

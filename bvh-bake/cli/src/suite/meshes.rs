@@ -1,10 +1,14 @@
 //! The meshes that were sent, baked in memory under their names.
 
-use super::message::MeshMessage;
+use super::message::{MeshFile, MeshMessage};
+use crate::console::{Record, record};
+use crate::process;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes};
-use bvh_query::Bvh;
+use bvh_query::{Bvh, ReadAhead};
 use std::collections::HashMap;
+use std::fs;
+use std::time::Instant;
 
 /// The meshes by name. A mesh that was refused keeps the reason, which questions about it repeat.
 #[derive(Default)]
@@ -16,6 +20,14 @@ impl Meshes {
         let baked = bake(message);
         let answer = baked.as_ref().map(|_| message.triangles.len()).map_err(Clone::clone);
         self.0.insert(message.mesh.clone(), baked);
+        answer
+    }
+
+    /// Bakes the mesh of a file into a `.cbvh` file beside it, maps that, and returns how long each took.
+    pub(super) fn add_file(&mut self, message: &MeshFile) -> Result<Record, String> {
+        let baked = bake_file(message);
+        let answer = baked.as_ref().map(|(_, record)| record.clone()).map_err(Clone::clone);
+        self.0.insert(message.mesh.clone(), baked.map(|(bvh, _)| bvh));
         answer
     }
 
@@ -38,4 +50,29 @@ fn bake(message: &MeshMessage) -> Result<Bvh, String> {
         ));
     }
     Bvh::from_bytes(bytes).map_err(|error| error.to_string())
+}
+
+/// Bakes and maps the mesh of a file. Returns it with the seconds of the bake, of the opening, and the bytes of the baked file.
+fn bake_file(message: &MeshFile) -> Result<(Bvh, Record), String> {
+    let bytes = fs::read(&message.file).map_err(|error| error.to_string())?;
+    let (corners, triangles) = bytes.split_at_checked(12 * message.corners).ok_or("expected more corners")?;
+    let number = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
+    let points = |bytes: &[u8]| [0, 4, 8].map(|at| f64::from(f32::from_le_bytes(number(&bytes[at..]))));
+    let indices = |bytes: &[u8]| [0, 4, 8].map(|at| u32::from_le_bytes(number(&bytes[at..])));
+    let corners = corners.chunks_exact(12).map(points).collect();
+    let triangles: Vec<_> = triangles.chunks_exact(12).map(indices).collect();
+    if triangles.len() != message.triangles {
+        return Err(format!("expected {} triangles, found {}", message.triangles, triangles.len()));
+    }
+    let start = Instant::now();
+    let mesh = Mesh::from_triangles(corners, triangles);
+    let (bytes, _) = to_bytes(&mesh, &Options::default()).map_err(|error| error.to_string())?;
+    let seconds = start.elapsed().as_secs_f64();
+    let path = message.file.with_extension("cbvh");
+    fs::write(&path, &bytes).map_err(|error| error.to_string())?;
+    let start = Instant::now();
+    let bvh = process::map(&path, ReadAhead::Usual).map_err(|error| error.to_string())?;
+    let open_seconds = start.elapsed().as_secs_f64();
+    let record = record! { triangles: message.triangles, seconds: seconds, open_seconds: open_seconds, bytes: bytes.len() };
+    Ok((bvh, record))
 }

@@ -1,6 +1,7 @@
 //! The lines that the suite sends: a greeting, a mesh, or a question.
 
 use serde::Deserialize;
+use std::path::PathBuf;
 
 /// A line.
 #[derive(Debug, Deserialize)]
@@ -10,6 +11,12 @@ pub(super) enum Message {
     Hello(Hello),
     /// A mesh, which later lines name.
     Mesh(MeshMessage),
+    /// A mesh in a file, which later lines name.
+    File(MeshFile),
+    /// Instances of meshes, which later lines name together.
+    Field(FieldMessage),
+    /// A question about many poses of meshes that were sent, to be timed.
+    Timed(TimedQuestion),
     /// A question about meshes that were sent.
     Question(Box<Question>),
 }
@@ -32,6 +39,38 @@ pub(super) struct MeshMessage {
     pub(super) mesh: String,
     pub(super) vertices: Vec<[Number; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
+}
+
+/// A mesh whose corners and triangles are in a file, as little-endian `f32` and `u32`.
+#[derive(Debug, Deserialize)]
+pub(super) struct MeshFile {
+    pub(super) mesh: String,
+    pub(super) file: PathBuf,
+    pub(super) corners: usize,
+    pub(super) triangles: usize,
+}
+
+/// Instances: the number of each mesh in the list, and its pose.
+#[derive(Debug, Deserialize)]
+pub(super) struct FieldMessage {
+    pub(super) field: String,
+    pub(super) meshes: Vec<String>,
+    pub(super) instances: Vec<(usize, [f64; 12])>,
+}
+
+/// A question about many poses.
+#[derive(Debug, Deserialize)]
+pub(super) struct TimedQuestion {
+    pub(super) id: u64,
+    pub(super) ask: String,
+    pub(super) a: String,
+    pub(super) b: String,
+    pub(super) poses: Vec<[f64; 12]>,
+    /// No pose is begun after so many seconds.
+    pub(super) budget: f64,
+    /// All poses in one call, on all cores.
+    #[serde(default)]
+    pub(super) batch: bool,
 }
 
 /// A question. Which of the fields it has depends on what it asks.

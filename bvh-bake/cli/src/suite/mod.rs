@@ -7,6 +7,7 @@
 mod ask;
 mod meshes;
 mod message;
+mod timed;
 
 use crate::asking;
 use crate::console::{Failure, Record, record};
@@ -15,6 +16,7 @@ use clap::Args;
 use meshes::Meshes;
 use message::{Hello, Message, Numbered};
 use std::io::{BufRead as _, Write as _};
+use timed::Fields;
 
 const HELP: &str = "\
 Examples:
@@ -44,14 +46,14 @@ const MAX_DISTANCE_ERROR_OF_SIZE: f64 = 1e-14;
 /// Answers each line of standard input with one line on standard output.
 pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
     let mut querier = Querier::with_backend(asking::backend(&arguments.isa)?);
-    let mut meshes = Meshes::default();
+    let (mut meshes, mut fields) = (Meshes::default(), Fields::default());
     let mut output = std::io::stdout().lock();
     for line in std::io::stdin().lock().split(b'\n') {
         let line = line.map_err(|error| Failure::System(format!("standard input: cannot read: {error}")))?;
         if line.trim_ascii().is_empty() {
             continue;
         }
-        let answer = answer(&line, &mut meshes, &mut querier);
+        let answer = answer(&line, &mut meshes, &mut fields, &mut querier);
         writeln!(output, "{answer}")
             .and_then(|()| output.flush())
             .map_err(|error| Failure::from_output(&error))?;
@@ -60,22 +62,26 @@ pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
 }
 
 /// Answers one line.
-fn answer(line: &[u8], meshes: &mut Meshes, querier: &mut Querier) -> Record {
+fn answer(line: &[u8], meshes: &mut Meshes, fields: &mut Fields, querier: &mut Querier) -> Record {
     match serde_json::from_slice(line) {
         Ok(Message::Hello(Hello { hello: PROTOCOL })) => hello(),
         Ok(Message::Hello(Hello { hello })) => {
             refusal(&format!("expected version {PROTOCOL} of the protocol, found {hello}"))
         }
-        Ok(Message::Mesh(mesh)) => match meshes.add(&mesh) {
-            Ok(triangles) => record! { mesh: mesh.mesh, triangles: triangles },
-            Err(reason) => record! { mesh: mesh.mesh }.with(refusal(&reason)),
-        },
+        Ok(Message::Mesh(mesh)) => about(
+            record! { mesh: mesh.mesh },
+            meshes.add(&mesh).map(|triangles| record! { triangles: triangles }),
+        ),
+        Ok(Message::File(mesh)) => about(record! { mesh: mesh.mesh }, meshes.add_file(&mesh)),
+        Ok(Message::Field(field)) => {
+            let seconds = fields.add(&field, meshes).map(|seconds| record! { seconds: seconds });
+            about(record! { field: field.field }, seconds)
+        }
+        Ok(Message::Timed(question)) => {
+            about(record! { id: question.id }, timed::ask(&question, meshes, fields, querier))
+        }
         Ok(Message::Question(question)) => {
-            let id = record! { id: question.id };
-            match ask::ask(&question, meshes, querier) {
-                Ok(answer) => id.with(answer),
-                Err(reason) => id.with(refusal(&reason)),
-            }
+            about(record! { id: question.id }, ask::ask(&question, meshes, querier))
         }
         Err(error) => {
             let refusal = refusal(&format!("expected a line of the protocol, found {error}"));
@@ -85,6 +91,11 @@ fn answer(line: &[u8], meshes: &mut Meshes, querier: &mut Querier) -> Record {
             }
         }
     }
+}
+
+/// Returns what a line is about, with its answer or with a refusal.
+fn about(what: Record, answer: Result<Record, String>) -> Record {
+    what.with(answer.unwrap_or_else(|reason| refusal(&reason)))
 }
 
 /// States what the command claims.
@@ -97,6 +108,8 @@ fn hello() -> Record {
         coordinates: "f32",
         placement: "f64",
         questions: ask::QUESTIONS,
+        timed: ["collide", "distance", "contacts", "touched"],
+        batch: ["collide", "distance"],
         features: ["open", "concave", "degenerate", "nested", "overlapping parts", "range", "refuses"],
         distance_error: MAX_DISTANCE_ERROR_OF_SIZE,
         error_unit: "size",
@@ -114,8 +127,10 @@ mod tests {
 
     #[test]
     fn every_line_gets_an_answer() {
-        let (mut meshes, mut querier) = (Meshes::default(), Querier::new().unwrap());
-        let mut ask = |line: &str| answer(line.as_bytes(), &mut meshes, &mut querier).to_string();
+        let (mut meshes, mut fields) = (Meshes::default(), Fields::default());
+        let mut querier = Querier::new().unwrap();
+        let mut ask =
+            |line: &str| answer(line.as_bytes(), &mut meshes, &mut fields, &mut querier).to_string();
         assert!(ask(r#"{"hello": 1}"#).starts_with(r#"{"hello":1,"name":"cbvh""#));
         for line in
             ["", "{", "[]", "{}", r#"{"id": 1}"#, r#"{"mesh": 3}"#, r#"{"id": 1, "ask": "age", "a": "t"}"#]
@@ -137,7 +152,8 @@ mod tests {
 
     #[test]
     fn what_is_no_mesh_or_not_exactly_stored_is_refused() {
-        let (mut meshes, mut querier) = (Meshes::default(), Querier::new().unwrap());
+        let (mut meshes, mut fields) = (Meshes::default(), Fields::default());
+        let mut querier = Querier::new().unwrap();
         for (corner, triangle) in [
             (r#"["nan", 0, 0]"#, "[0, 1, 2]"),
             (r#"["-inf", 0, 0]"#, "[0, 1, 2]"),
@@ -148,10 +164,10 @@ mod tests {
             let line = format!(
                 r#"{{"mesh": "m", "vertices": [{corner}, [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [{triangle}]}}"#
             );
-            let refused = answer(line.as_bytes(), &mut meshes, &mut querier).to_string();
+            let refused = answer(line.as_bytes(), &mut meshes, &mut fields, &mut querier).to_string();
             assert!(refused.contains(r#""refused":true"#), "{refused}");
             let asked = r#"{"id": 1, "ask": "side", "a": "m", "point": [0, 0, 0]}"#;
-            let refused = answer(asked.as_bytes(), &mut meshes, &mut querier).to_string();
+            let refused = answer(asked.as_bytes(), &mut meshes, &mut fields, &mut querier).to_string();
             assert!(refused.contains(r#""refused":true"#), "{refused}");
         }
     }
