@@ -44,8 +44,20 @@ def distance(a, b, question):
     return {"answer": max(float(coal.distance(a, IDENTITY, b, coal.Transform3s(*rows(question)), request, result)), 0.0)}
 
 
+def timed_collide(a, b, pose):
+    return coal.collide(a, IDENTITY, b, pose, ONE, coal.CollisionResult())
+
+
+def timed_distance(a, b, pose):
+    return coal.distance(a, IDENTITY, b, pose, coal.DistanceRequest(), coal.DistanceResult())
+
+
+ONE = coal.CollisionRequest()
+ONE.num_max_contacts, ONE.security_margin, ONE.break_distance, ONE.enable_contact = 1, 0.0, 0.0, False
+
 serve(
     "Coal", coal.__version__, "BVHModelOBBRSS, security_margin 0, break_distance 0", mesh,
     {"collide": collide, "contacts": contacts, "distance": distance},
+    {"collide": (coal.Transform3s, timed_collide, bool), "distance": (coal.Transform3s, timed_distance, lambda d: max(d, 0.0))},
     coordinates="f64", placement="f64", features=["open", "concave", "nested", "overlapping parts", "degenerate", "range"], distance_error=1e-6, error_unit="size",
 )  # fmt: skip

@@ -40,8 +40,17 @@ def distance(a, b, question):
     return {"answer": max(fcl.distance(*placed(a, b, question), fcl.DistanceRequest(), fcl.DistanceResult()), 0.0)}
 
 
+def timed_collide(a, b, pose):
+    return fcl.collide(fcl.CollisionObject(a, IDENTITY), fcl.CollisionObject(b, pose), fcl.CollisionRequest(), fcl.CollisionResult())
+
+
+def timed_distance(a, b, pose):
+    return fcl.distance(fcl.CollisionObject(a, IDENTITY), fcl.CollisionObject(b, pose), fcl.DistanceRequest(), fcl.DistanceResult())
+
+
 serve(
     "FCL", version("python-fcl"), "BVHModel, OBBRSS, default requests", mesh,
     {"collide": collide, "contacts": contacts, "distance": distance},
+    {"collide": (fcl.Transform, timed_collide, lambda count: count > 0), "distance": (fcl.Transform, timed_distance, lambda d: max(d, 0.0))},
     coordinates="f64", placement="f64", features=["open", "concave", "nested", "overlapping parts", "degenerate", "range"], distance_error=1e-6, error_unit="size",
 )  # fmt: skip

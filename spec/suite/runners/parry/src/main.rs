@@ -4,14 +4,17 @@
 //! which `contains_local_point` needs, and have half edges, which tell whether a mesh closes. Pairs of triangles are those of
 //! `leaf_pairs` that `intersection_test` confirms. Meshes that overlap themselves are not claimed, because the nearest triangle
 //! does not tell what is inside them.
+//!
+//! Timed questions are put as an application would, with a pose of parry3d.
 
 use parry3d_f64::bounding_volume::BoundingVolume;
-use parry3d_f64::math::{Pose, Vector};
+use parry3d_f64::math::{Matrix, Pose, Rotation, Vector};
 use parry3d_f64::query::{PointQuery, Ray, RayCast, Unsupported, distance, intersection_test};
 use parry3d_f64::shape::{Segment, TriMesh, TriMeshFlags};
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::io::{BufRead, Write, stdin, stdout};
+use std::time::Instant;
 
 const AT: Pose = Pose::IDENTITY;
 
@@ -29,8 +32,12 @@ fn mesh(message: &Value) -> Result<TriMesh, String> {
     let list = |key: &str| message[key].as_array().cloned().unwrap_or_default();
     let corner = |x: &Value| vector(&json!({ "x": x }), "x");
     let corners: Vec<Vector> = list("vertices").iter().map(corner).collect::<Result<_, _>>()?;
-    let mut triangles: Vec<[u32; 3]> =
+    let triangles: Vec<[u32; 3]> =
         serde_json::from_value(message["triangles"].clone()).map_err(|e| e.to_string())?;
+    build(corners, triangles)
+}
+
+fn build(corners: Vec<Vector>, mut triangles: Vec<[u32; 3]>) -> Result<TriMesh, String> {
     if triangles.iter().flatten().any(|&i| i as usize >= corners.len()) {
         return Err("an index beyond the corners".into());
     }
@@ -42,6 +49,60 @@ fn mesh(message: &Value) -> Result<TriMesh, String> {
     }
     TriMesh::with_flags(corners, triangles, TriMeshFlags::ORIENTED | TriMeshFlags::HALF_EDGE_TOPOLOGY)
         .map_err(|e| e.to_string())
+}
+
+/// Returns the bytes of resident memory, or 0 where that is unknown.
+fn resident() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<u64>().ok()).unwrap_or(0) * 1024
+}
+
+/// Returns the mesh of a file, and what it cost: seconds, and bytes where these are known.
+fn mesh_of_file(message: &Value) -> Result<(TriMesh, Value), String> {
+    let bytes = std::fs::read(message["file"].as_str().unwrap_or("")).map_err(|e| e.to_string())?;
+    let count = message["corners"].as_u64().ok_or("expected a number of corners")? as usize;
+    let (corners, triangles) = bytes.split_at_checked(12 * count).ok_or("expected more corners")?;
+    let three = |row: &[u8]| [0, 4, 8].map(|i| [row[i], row[i + 1], row[i + 2], row[i + 3]]);
+    let corner = |row: &[u8]| Vector::from_array(three(row).map(|x| f32::from_le_bytes(x).into()));
+    let corners = corners.chunks_exact(12).map(corner).collect();
+    let triangles = triangles.chunks_exact(12).map(|row| three(row).map(u32::from_le_bytes)).collect();
+    let (before, start) = (resident(), Instant::now());
+    let mesh = build(corners, triangles)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let bytes = (before > 0).then(|| resident().saturating_sub(before));
+    Ok((mesh, json!({ "seconds": seconds, "bytes": bytes })))
+}
+
+/// Answers a question at many poses, and times each answer by itself.
+fn timed(question: &Value, a: &TriMesh, b: &TriMesh) -> Result<Value, String> {
+    let ask = match question["ask"].as_str().unwrap_or("") {
+        "collide" => |a: &TriMesh, b: &TriMesh, pose: &Pose| {
+            intersection_test(&AT, a, pose, b).map(|found| f64::from(u8::from(found.intersecting)))
+        },
+        "distance" => {
+            |a: &TriMesh, b: &TriMesh, pose: &Pose| distance(&AT, a, pose, b).map(|found| found.distance)
+        }
+        _ => return Err("not a timed question of this runner".into()),
+    };
+    let list = question["poses"].as_array().ok_or("expected poses")?;
+    let poses: Vec<Vec<f64>> =
+        list.iter().map(|x| numbers(&json!({ "x": x }), "x")).collect::<Result<_, _>>()?;
+    let budget = question["budget"].as_f64().ok_or("expected a budget")?;
+    let (began, mut answers, mut nanoseconds) = (Instant::now(), vec![], vec![]);
+    for m in poses {
+        let column = |i: usize| Vector::new(m[i], m[4 + i], m[8 + i]);
+        let turn = Rotation::from_mat3(&Matrix::from_cols(column(0), column(1), column(2)));
+        let pose = Pose::from_parts(column(3), turn);
+        let start = Instant::now();
+        let answer = ask(a, b, &pose);
+        nanoseconds.push(start.elapsed().as_nanos() as u64);
+        answers.push(answer.map_err(|reason| reason.to_string())?);
+        if began.elapsed().as_secs_f64() > budget {
+            break;
+        }
+    }
+    Ok(json!({ "answers": answers, "nanoseconds": nanoseconds }))
 }
 
 /// Returns B with its corners at R x + t.
@@ -82,6 +143,9 @@ fn found(answer: Result<impl Into<Value>, Unsupported>) -> Result<Value, String>
 fn answer(question: &Value, meshes: &HashMap<String, TriMesh>) -> Result<Value, String> {
     let mesh = |key: &str| meshes.get(question[key].as_str().unwrap_or("")).ok_or("a mesh was refused");
     let a = mesh("a")?;
+    if question.get("poses").is_some() {
+        return timed(question, a, mesh("b")?);
+    }
     let b = || placed(mesh("b")?, &numbers(question, "pose")?);
     match question["ask"].as_str().unwrap_or("") {
         "collide" => found(intersection_test(&AT, a, &AT, &b()?).map(|found| found.intersecting)),
@@ -112,12 +176,19 @@ fn main() {
             Ok(json!({
                 "hello": 1, "name": "parry3d", "version": "0.31.1", "settings": "parry3d-f64, TriMesh, ORIENTED",
                 "questions": ["collide", "distance", "contacts", "closest", "side", "ray", "segment"],
-                "coordinates": "f64", "placement": "f64", "features": ["open", "concave", "nested", "degenerate", "range"],
+                "timed": ["collide", "distance"], "coordinates": "f64", "placement": "f64", "features": ["open", "concave", "nested", "degenerate", "range"],
                 "distance_error": 1e-6, "error_unit": "size",
             }))
         } else if let Some(name) = message["mesh"].as_str() {
             reply["mesh"] = json!(name);
-            mesh(&message).map(|mesh| meshes.insert(name.to_owned(), mesh)).map(|_| json!({}))
+            let made = match message.get("file") {
+                Some(_) => mesh_of_file(&message),
+                None => mesh(&message).map(|mesh| (mesh, json!({}))),
+            };
+            made.map(|(mesh, cost)| {
+                meshes.insert(name.to_owned(), mesh);
+                cost
+            })
         } else {
             reply["id"] = message["id"].clone();
             answer(&message, &meshes)

@@ -1,0 +1,151 @@
+// Speaks the timed part of the protocol for libraries in C++: reads a line, calls the library, writes a line.
+//
+// A library is a type with a Mesh, a Pose, a Result, and the functions that `Runner` calls. The clock runs from the call of the
+// library to its result. Poses are made before, and contacts are counted after. Bytes are the growth of resident memory during a build.
+
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+#ifdef __GLIBC__
+#include <malloc.h>
+#include <unistd.h>
+#endif
+
+using nlohmann::json;
+using Point = std::array<double, 3>;
+using Face = std::array<std::uint32_t, 3>;
+using Numbers = std::array<double, 12>;
+using Pairs = std::set<std::pair<long, long>>;
+
+using Clock = std::chrono::steady_clock;
+inline double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// Returns the bytes of resident memory, or -1 where that is unknown.
+inline long resident() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+  long all = 0, pages = 0;
+  std::ifstream("/proc/self/statm") >> all >> pages;
+  return pages * sysconf(_SC_PAGESIZE);
+#else
+  return -1;
+#endif
+}
+
+template <class Number, class Row> std::vector<Row> rows(std::istream& file, std::size_t count) {
+  std::vector<std::array<Number, 3>> raw(count);
+  if (!file.read(reinterpret_cast<char*>(raw.data()), std::streamsize(sizeof(raw[0]) * count))) throw std::runtime_error("a mesh file that ends early");
+  std::vector<Row> found;
+  for (const auto& r : raw) found.push_back({r[0], r[1], r[2]});
+  return found;
+}
+
+template <class Library> class Runner {
+  using Mesh = typename Library::Mesh;
+  struct Body {
+    std::unique_ptr<typename Library::Object> object;
+    std::string name;
+  };
+  std::map<std::string, std::shared_ptr<Mesh>> meshes;
+  std::map<std::string, std::unique_ptr<typename Library::Field>> fields;
+  Body body;
+
+  std::shared_ptr<Mesh> mesh(const std::string& name) const { return meshes.at(name); }
+
+  json add(const json& message) {
+    std::ifstream file(message["file"].get<std::string>(), std::ios::binary);
+    auto corners = rows<float, Point>(file, message["corners"]);
+    auto faces = rows<std::uint32_t, Face>(file, message["triangles"]);
+    long before = resident();
+    auto start = Clock::now();
+    meshes[message["mesh"]] = Library::mesh(corners, faces);
+    double seconds = seconds_since(start);
+    json answer = {{"seconds", seconds}};
+    if (before >= 0) answer["bytes"] = resident() - before;
+    return answer;
+  }
+
+  json add_field(const json& message) {
+    if constexpr (Library::has_fields) {
+      auto start = Clock::now();
+      auto field = std::make_unique<typename Library::Field>();
+      for (const auto& instance : message["instances"])
+        field->add(mesh(message["meshes"].at(instance.at(0).get<std::size_t>())), Library::pose(instance.at(1).get<Numbers>()));
+      field->finish();
+      fields[message["field"]] = std::move(field);
+      return {{"seconds", seconds_since(start)}};
+    }
+    throw std::runtime_error("no fields");
+  }
+
+  template <class Ask, class Count> json one_by_one(const json& question, Ask ask, Count count) {
+    std::vector<typename Library::Pose> poses;
+    for (const auto& pose : question["poses"]) poses.push_back(Library::pose(pose.get<Numbers>()));
+    double budget = question["budget"];
+    json answers = json::array(), nanoseconds = json::array();
+    auto began = Clock::now();
+    for (const auto& pose : poses) {
+      auto start = Clock::now();
+      auto result = ask(pose);
+      auto end = Clock::now();
+      nanoseconds.push_back(std::chrono::duration_cast<std::chrono::nanoseconds>(end - start).count());
+      answers.push_back(double(count(result)));
+      if (seconds_since(began) > budget) break;
+    }
+    return {{"answers", answers}, {"nanoseconds", nanoseconds}};
+  }
+
+  json answer(const json& question) {
+    std::string ask = question["ask"], a = question["a"];
+    auto b = mesh(question["b"]);
+    auto number = [](double x) { return x; };
+    if constexpr (Library::has_fields) {
+      if (auto found = fields.find(a); found != fields.end()) {
+        auto& field = *found->second;
+        if (body.name != question["b"]) body = {Library::object(b), question["b"]};
+        auto& object = *body.object;
+        if (ask == "collide") return one_by_one(question, [&](const auto& pose) { return field.touched(object, pose, false); }, number);
+        if (ask == "touched") return one_by_one(question, [&](const auto& pose) { return field.touched(object, pose, true); }, number);
+        if (ask == "distance") return one_by_one(question, [&](const auto& pose) { return field.distance(object, pose); }, number);
+      }
+    }
+    auto m = mesh(a);
+    if (ask == "collide") return one_by_one(question, [&](const auto& pose) { return Library::collide(*m, *b, pose); }, number);
+    if (ask == "distance") return one_by_one(question, [&](const auto& pose) { return Library::distance(*m, *b, pose); }, number);
+    if (ask == "contacts") return one_by_one(question, [&](const auto& pose) { return Library::contacts(*m, *b, pose); }, [](const auto& result) { return Library::pairs(result).size(); });
+    throw std::runtime_error("not a question of this runner");
+  }
+
+ public:
+  int run(json hello) {
+    for (std::string line; std::getline(std::cin, line);) {
+      json message = json::parse(line), about;
+      if (message.contains("hello")) about = hello;
+      try {
+        if (message.contains("mesh")) about["mesh"] = message["mesh"], about.update(add(message));
+        else if (message.contains("field")) about["field"] = message["field"], about.update(add_field(message));
+        else if (message.contains("ask")) about["id"] = message["id"], about.update(answer(message));
+      } catch (const std::exception& reason) {
+        about["refused"] = true, about["reason"] = reason.what();
+      }
+      std::cout << about << std::endl;
+    }
+    return 0;
+  }
+};
+
+// Returns a greeting of a library that is right to within a millionth of the size, and answers timed questions only.
+inline json greeting(const std::string& name, const std::string& version, const std::string& settings, const std::vector<std::string>& timed) {
+  return {{"hello", 1}, {"name", name}, {"version", version}, {"settings", settings}, {"questions", json::array()}, {"timed", timed},
+          {"coordinates", "f64"}, {"placement", "f64"}, {"features", json::array()}, {"distance_error", 1e-6}, {"error_unit", "size"}};
+}
