@@ -1,0 +1,257 @@
+"""Makes a page of tables and plots of the raw times of run.py.
+
+    python report.py DIR [--page FILE] [--subject cbvh]
+
+The time of a pose is the median over the steady rounds, and a cell has the median of these over the poses. The 99th percentile is over all
+single queries. A library with a wrong answer in a cell is marked there, and counts neither as best nor as other. One whose budget
+did not suffice for all poses is marked too: its time is about the first of them. The subject is the library that the ratios are about. What it loses comes first. Needs Python alone.
+"""
+
+import argparse
+import json
+import os
+import sys
+from math import ceil, log10
+from pathlib import Path
+from statistics import median
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b", "#bcbd22", "#17becf", "#000000")
+PRESETS = ("deep", "touching", "0.0001%", "0.5%", "1%", "5%", "10%", "far")
+QUESTIONS = {
+    "collide": "Do the two touch?",
+    "distance": "How far apart are they?",
+    "contacts": "Which pairs of triangles touch?",
+    "touched": "How many instances of the field does the mesh touch?",
+}
+SCALING = ("scan-1k", "scan-10k", "scan-100k")
+
+
+class Cell:
+    """What one library needed for one question at one preset of a pair."""
+
+    def __init__(self):
+        self.rounds, self.wrong = {}, set()
+
+    def add(self, record):
+        self.rounds[record["round"]] = record["nanoseconds"]
+        self.wrong.update(record["wrong"])
+
+    def finish(self):
+        # The first round is cold, unless it is the only one.
+        steady = [times for number, times in self.rounds.items() if number] or list(self.rounds.values())
+        count = max(map(len, steady))
+        self.poses, self.cold = count, median(self.rounds[min(self.rounds)])
+        self.median = median(median(times[k] for times in steady if k < len(times)) for k in range(count))
+        ordered = sorted(x for times in steady for x in times)
+        self.p99 = ordered[min(len(ordered), ceil(0.99 * len(ordered))) - 1]
+
+
+def read(folder):
+    """Returns the head, what builds cost, what batches took, who failed, and the cells by question, pair, preset and library."""
+    head, builds, batches, failed, cells = None, [], [], [], {}
+    for line in (folder / "times.jsonl").read_text(encoding="utf-8").splitlines():
+        record = json.loads(line)
+        if "round" in record:
+            row = cells.setdefault((record["ask"], record["pair"], record["preset"]), {})
+            row.setdefault(record["runner"], Cell()).add(record)
+        elif "batch" in record:
+            batches.append(record)
+        elif "failed" in record:
+            failed.append(f"{record['runner']} failed on {record['pair']}: `{record['failed']}`")
+        elif "meshes" in record:
+            builds.append(record)
+        else:
+            head = record
+    for row in cells.values():
+        for cell in row.values():
+            cell.finish()
+    return head, builds, batches, failed, cells
+
+
+def microseconds(nanoseconds):
+    value = nanoseconds / 1000
+    return f"{value:.2f}" if value < 10 else f"{value:.1f}" if value < 100 else f"{value:,.0f}"
+
+
+def table(names, rows):
+    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    return lines + ["| " + " | ".join(row) + " |" for row in rows]
+
+
+def best_other(row, subject):
+    """Returns the fastest other library whose answers are right, or None."""
+    others = [(cell.median, name) for name, cell in row.items() if name != subject and not cell.wrong]
+    return min(others, default=None)
+
+
+def ratio(row, subject):
+    """Returns how many times as long as the subject the best other library takes, or None."""
+    other = best_other(row, subject)
+    return None if other is None or subject not in row or row[subject].wrong else other[0] / row[subject].median
+
+
+def ordered(cells, question):
+    pairs = list(dict.fromkeys(pair for _, pair, _ in cells))
+    return sorted((key for key in cells if key[0] == question), key=lambda key: (pairs.index(key[1]), PRESETS.index(key[2])))
+
+
+def losses(cells, subject):
+    found = []
+    for (question, pair, preset), row in cells.items():
+        share = ratio(row, subject)
+        if share is not None and share < 1:
+            other, name = best_other(row, subject)
+            found.append((share, [question, pair, preset, microseconds(row[subject].median), name, microseconds(other), f"{1 / share:.2f}"]))
+    return [row for _, row in sorted(found)]
+
+
+def main_table(cells, question, subject, names):
+    rows = []
+    for key in ordered(cells, question):
+        row, texts = cells[key], []
+        right = [cell.median for cell in row.values() if not cell.wrong]
+        poses = max(cell.poses for cell in row.values())
+        for name in names:
+            cell = row.get(name)
+            if cell is None:
+                texts.append("")
+            elif cell.wrong:
+                texts.append(f"{microseconds(cell.median)}, {len(cell.wrong)} of {cell.poses} wrong")
+            else:
+                fewer = f", {cell.poses} poses" if cell.poses < poses else ""
+                text = f"{microseconds(cell.median)} ({microseconds(cell.p99)}{fewer})"
+                texts.append(f"**{text}**" if cell.median == min(right) else text)
+        share = ratio(row, subject)
+        rows.append([key[1], key[2], *texts, f"{share:.1f}" if share else ""])
+    used = [k for k, name in enumerate(names) if any(row[k + 2] for row in rows)]
+    return table(["pair", "gap", *(names[k] for k in used), f"best other / {subject}"], [[*row[:2], *(row[k + 2] for k in used), row[-1]] for row in rows])
+
+
+def costs(record):
+    """Returns what it costs to get ready: milliseconds and bytes per triangle, or None where a library does not tell."""
+    of = list(record["meshes"].values())
+    total = lambda key: None if any(cost[key] is None for cost in of) else sum(cost[key] for cost in of)
+    built, opened, size = total("seconds"), total("open_seconds"), total("bytes")
+    field, first = record.get("field_seconds", 0), record["first_nanoseconds"]
+    ready = lambda seconds: None if seconds is None or first is None else 1e3 * (seconds + field) + first / 1e6
+    per_triangle = None if size is None else size / sum(record["triangles"].values())
+    return {"build, ms": 1e3 * (built + field), "bytes per triangle": per_triangle, "first answer from the mesh, ms": ready(built), "first answer from a file, ms": ready(opened)}
+
+
+def short(value):
+    return "" if value is None else f"{value:.3g}" if value < 100 else f"{value:,.0f}"
+
+
+def build_table(builds):
+    rows = [[record["pair"], record["runner"], *map(short, costs(record).values())] for record in builds]
+    return table(["pair", "library", *costs(builds[0])], rows)
+
+
+def dearer(builds, subject):
+    """Returns where another library is ready sooner, or smaller."""
+    rows = []
+    for record in (record for record in builds if record["runner"] == subject):
+        others = [other for other in builds if other["pair"] == record["pair"] and other is not record]
+        for name, own in costs(record).items():
+            best = min(((costs(other)[name], other["runner"]) for other in others if costs(other)[name] is not None), default=None)
+            if own is not None and best is not None and best[0] < own:
+                rows.append([record["pair"], name, short(own), best[1], short(best[0])])
+    return rows
+
+
+def plot(title, labels, lines, x_title, colours):
+    """Returns an SVG of times in microseconds on a logarithmic axis, one line per library."""
+    width, height, left, top, right, bottom = 760, 400, 70, 40, 170, 50
+    values = [y for line in lines.values() for y in line if y is not None]
+    low, high = int(log10(min(values)) // 1), ceil(log10(max(values)) + 1e-9)
+    x = lambda k: left + (width - left - right) * (k + 0.5) / len(labels)
+    y = lambda value: top + (height - top - bottom) * (high - log10(value)) / (high - low)
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12">',
+             f'<rect width="{width}" height="{height}" fill="white"/><text x="{left}" y="22" font-size="15">{title}</text>']  # fmt: skip
+    for power in range(low, high + 1):
+        at = y(10.0**power)
+        parts.append(f'<line x1="{left}" x2="{width - right}" y1="{at:.1f}" y2="{at:.1f}" stroke="#ddd"/><text x="{left - 8}" y="{at + 4:.1f}" text-anchor="end">{10.0**power:g} µs</text>')
+    for k, label in enumerate(labels):
+        parts.append(f'<text x="{x(k):.1f}" y="{height - bottom + 18}" text-anchor="middle">{label}</text>')
+    parts.append(f'<text x="{(left + width - right) / 2}" y="{height - 10}" text-anchor="middle">{x_title}</text>')
+    for number, (name, line) in enumerate(lines.items()):
+        colour = colours[name]
+        points = [(x(k), y(value)) for k, value in enumerate(line) if value is not None]
+        parts.append(f'<polyline points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in points)}" fill="none" stroke="{colour}" stroke-width="2"/>')
+        parts += [f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3" fill="{colour}"/>' for a, b in points]
+        parts.append(f'<rect x="{width - right + 15}" y="{top + 18 * number}" width="12" height="12" fill="{colour}"/><text x="{width - right + 33}" y="{top + 18 * number + 10}">{name}</text>')
+    return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def plots(cells, names):
+    """Returns the plots by the names of their files: for each question and pair over the presets, and over the size of the meshes."""
+    found, colours = {}, {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(names)}
+
+    def add(file, title, keys, labels, x_title):
+        lines = {name: [cells[key][name].median / 1000 if key in cells and name in cells[key] and not cells[key][name].wrong else None for key in keys] for name in names}
+        lines = {name: line for name, line in lines.items() if any(value is not None for value in line)}
+        if lines and len(keys) > 1:
+            found[file] = plot(title, labels, lines, x_title, colours)
+
+    for question in ("collide", "distance"):
+        for pair in dict.fromkeys(pair for asked, pair, _ in cells if asked == question):
+            keys = [key for key in ordered(cells, question) if key[1] == pair]
+            add(f"{question}-{pair}.svg", f"{question}, {pair}: median time per query", keys, [key[2] for key in keys], "gap, as a part of the diagonal of A")
+        sizes = [(question, pair, "1%") for pair in SCALING if (question, pair, "1%") in cells]
+        add(f"{question}-scaling.svg", f"{question} at a gap of 1%: median time per query", sizes, [key[1] for key in sizes], "triangles of each mesh")
+    return found
+
+
+def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
+    """Returns the lines of the page of results. Its plots are in a folder."""
+    names = list(head["runners"])
+    wrong = sum(len(cell.wrong) for row in cells.values() for cell in row.values())
+    lost = losses(cells, subject)
+    compared = sum(ratio(row, subject) is not None for row in cells.values())
+    where = f"on one {'pinned ' if head['pinned'] else ''}core of {head['processor']}, {head['system']}"
+    lines = ["# Speed", "", f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}.", "",
+             "Times are medians over the poses in microseconds, with the 99th percentile of all single queries in brackets. Each answer is compared with what is",
+             f"proved. {wrong or 'No'} answers are wrong, counted once for each pose, and a library with a wrong answer in a cell is not counted as best there. The fastest library that is right is in",
+             f"bold. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away: there, `collide` shows what a call costs. [What is timed]({readme})", "",
+             f"## Where {subject} loses", ""]  # fmt: skip
+    if lost:
+        lines += [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
+    else:
+        lines.append(f"No other library is faster in any of {compared} comparisons of queries.")
+    if dear := dearer(builds, subject):
+        lines += ["", "Before the first answer:", "", *table(["pair", "", subject, "less", "its figure"], dear)]
+    for question, title in QUESTIONS.items():
+        if any(key[0] == question for key in cells):
+            lines += ["", f"## {title} (`{question}`)", "", *main_table(cells, question, subject, names)]
+            lines += ["", *(f"![{file[:-4]}]({folder}{file})" for file in drawn if file.startswith(question + "-"))]
+    lines += ["", "## Builds, memory, and the first answer", "", "Both meshes together. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds)]
+    if batches:
+        rows = [[b["pair"], b["runner"], b["batch"], b["preset"], str(b["queries"]), str(b["threads"]), microseconds(1e9 * b["seconds"] / b["queries"])] for b in batches]
+        lines += ["", "## Many poses in one call, on all cores", "", *table(["pair", "library", "question", "gap", "queries", "threads", "time per query"], rows)]
+    if failed:
+        lines += ["", "## Failures", "", *(f"- {one}" for one in failed)]
+    lines += ["", "## Libraries", "", *table(["name", "version", "settings"], [[name, str(of["version"]), str(of["settings"])] for name, of in head["runners"].items()])]
+    return lines
+
+
+def main(argv=None):
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--page", type=Path, help="the file of the page; DIR/SPEED.md")
+    parser.add_argument("--subject", help="the library that ratios are about; cbvh, or the first one")
+    arguments = parser.parse_args(argv)
+    head, builds, batches, failed, cells = read(arguments.folder)
+    names = list(head["runners"])
+    subject = arguments.subject or ("cbvh" if "cbvh" in names else names[0])
+    drawn = plots(cells, names)
+    for file, text in drawn.items():
+        (arguments.folder / file).write_text(text, encoding="utf-8")
+    file = arguments.page or arguments.folder / "SPEED.md"
+    folder, readme = (Path(os.path.relpath(to, file.parent)).as_posix() for to in (arguments.folder, Path(__file__).parent / "README.md"))
+    lines = page(head, builds, batches, failed, cells, subject, drawn, "" if folder == "." else folder + "/", readme)
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,302 @@
+"""Times libraries on the same meshes and poses, one query after another, and checks each answer against what is proved.
+
+    python run.py --out DIR [--core 1] [--only PATTERN] [--runner NAME=COMMAND ...]
+    python run.py --out DIR --smoke --runner NAME=COMMAND           seconds: few poses of two small pairs
+
+Without --runner, all runners that are found are asked, and the others are named with what installs them. Each runner is a process
+of its own. Rounds are interleaved: each question is put to one runner after another, and then again. The raw times go to
+DIR/times.jsonl, and report.py makes tables and plots of them. Exits with 0 if all answers are right, with 1 if not or if a runner fails on the way, and with 2 if a
+runner does not start. Needs numpy.
+"""
+
+import argparse
+import datetime
+import json
+import platform
+import shlex
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import forms
+import poses
+import report
+
+SUITE = forms.HERE.parent
+sys.path.insert(0, str(SUITE))
+
+from judge import is_number
+from process import Crashed, Garbage, Hung, Process
+
+PROTOCOL = 1
+HELLO_SECONDS = 60
+# A build or a round of questions may take so many seconds beyond the budget.
+PATIENCE = 300
+ASKED = {"collide": (*poses.PRESETS, "touching", "deep"), "distance": (*poses.PRESETS, "touching"), "contacts": ("touching", "deep"), "touched": ("touching", "deep")}
+# What the first question is about, when nothing has been asked yet.
+FIRST = ("collide", "1%")
+SMOKE = ("scan-1k", "field")
+NATIVE = "speed/setup (cmake, the libraries)"
+# Name, command and what installs it. {suite} is the folder of the suite, {bin} the folder of what has been built, {python} this Python.
+RUNNERS = (
+    ("cbvh", "cbvh suite", "cargo install cbvh, or a folder with it in PATH"),
+    *((f"Coal {bv}", f"{{bin}}/coal_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
+    *((f"FCL {bv}", f"{{bin}}/fcl_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
+    ("parry3d", "{bin}/parry-runner", "speed/setup (cargo)"),
+    ("CGAL", "{bin}/cgal_native", NATIVE),
+    ("PQP", "{bin}/pqp_native", "PQP=FOLDER speed/setup, if its licence allows you to use it"),
+    ("Coal, Python", "{python} {suite}/runners/coal_runner.py", "pip install coal"),
+    ("FCL, Python", "{python} {suite}/runners/fcl_runner.py", "pip install python-fcl"),
+)
+
+
+class Runner:
+    """One library as a process, for one pair at a time, and what it was found to answer."""
+
+    def __init__(self, name, command, prefix=""):
+        self.name, self.command, self.unpinned = name, prefix + command, command
+        self.process, self.number, self.profile = None, 0, None
+
+    def start(self):
+        self.stop()
+        self.process = Process(self.command)
+        profile, _ = self.process.exchange({"hello": PROTOCOL}, HELLO_SECONDS)
+        if profile.get("hello") != PROTOCOL or not isinstance(profile.get("timed"), list):
+            raise Garbage(f"expected a greeting with the field timed, found {profile}")
+        self.profile = profile
+
+    def stop(self):
+        if self.process is not None:
+            self.process.stop()
+            self.process = None
+
+    def send(self, key, message):
+        """Sends a mesh or a field, and returns what its making cost."""
+        answer, _ = self.process.exchange(message, PATIENCE)
+        if answer.get(key) != message[key]:
+            raise Garbage(answer)
+        return answer
+
+    def ask(self, what, a, b, items, budget, **more):
+        """Asks about poses, and returns the answers and their times in nanoseconds, or None if the library refuses."""
+        self.number += 1
+        message = {"id": self.number, "ask": what, "a": a, "b": b, "poses": [pose for pose, _ in items], "budget": budget, **more}
+        answer, _ = self.process.exchange(message, PATIENCE + budget)
+        if answer.get("refused"):
+            return None
+        if answer.get("id") != self.number or not is_timed(answer, len(items), "batch" in more):
+            raise Garbage(answer)
+        return answer
+
+
+def is_timed(answer, count, is_batch):
+    """Tells whether an answer has as many numbers as it must have. A round that its budget ends has fewer, but at least one."""
+    answers, times, seconds = (answer.get(key) for key in ("answers", "nanoseconds", "seconds"))
+    if not isinstance(answers, list) or not answers or not all(map(is_number, answers)):
+        return False
+    if is_batch:
+        return len(answers) == count and is_number(seconds) and seconds > 0
+    return isinstance(times, list) and len(answers) == len(times) <= count and all(is_number(x) and x >= 0 for x in times)
+
+
+def is_right(what, answer, fact, size, profile):
+    """Tells whether an answer is what is proved, to within the error that the runner claims."""
+    touches = fact.get("contacts", fact.get("touched", 0)) > 0
+    if what == "distance":
+        lower, upper = (0.0, 0.0) if touches else (fact["lower"], fact["upper"])
+        error = profile["distance_error"] * (upper if profile["error_unit"] == "distance" else size)
+        return lower - error <= answer <= upper + error
+    return answer == (float(touches) if what == "collide" else fact[what])
+
+
+class Measurement:
+    """The runners of one call, the file of raw times, and how many answers were wrong."""
+
+    def __init__(self, arguments, runners, output):
+        self.arguments, self.runners, self.output = arguments, runners, output
+        self.wrong, self.asked, self.failed = 0, 0, 0
+
+    def write(self, record):
+        self.output.write(json.dumps(record) + "\n")
+        self.output.flush()
+
+    def pair(self, name, folder):
+        """Puts all questions about one pair, or one field and a mesh, to all runners."""
+        known = forms.catalogue()
+        a, b = known["pairs"][name]
+        field = known["fields"].get(a)
+        able = [runner for runner in self.runners if not field or "touched" in self.profile_of(runner)["timed"]]
+        if not able:
+            return
+        made = {mesh: forms.make(known["meshes"][mesh]) for mesh in sorted({*(field["meshes"] if field else [a]), b})}
+        items = {preset: found[:: self.arguments.sample] for preset, found in poses.load(name).items()}
+        size = {preset: max(max(abs(x) for x in pose) for pose, _ in found) for preset, found in items.items()}
+        largest = max(float(np.abs(corners).max()) for corners, _ in made.values())
+        size = {preset: max(largest, of) for preset, of in size.items()}
+        ready = [runner for runner in able if self.attempt(runner, name, self.prepare, runner, name, made, a, field, folder, items)]
+        for number in range(1 + self.arguments.rounds):
+            for what, presets in ASKED.items():
+                for preset in (p for p in presets if what in ("collide", "distance") or what in items[p][0][1]):
+                    # Each round begins with another runner.
+                    first = number % max(1, len(ready))
+                    for runner in ready[first:] + ready[:first]:
+                        if what in runner.profile["timed"]:
+                            if not self.attempt(runner, name, self.round, runner, name, number, what, preset, a, b, items[preset], size[preset]):
+                                ready.remove(runner)
+        for runner in ready:
+            runner.stop()
+
+    def attempt(self, runner, name, what, *arguments):
+        """Does something with a runner, and returns whether it works. One that fails is out for this pair."""
+        try:
+            return what(*arguments)
+        except (Crashed, Hung, Garbage, OSError) as failure:
+            runner.stop()
+            self.failed += 1
+            self.write({"runner": runner.name, "pair": name, "failed": f"{type(failure).__name__} {failure}".strip()})
+            return False
+
+    def prepare(self, runner, name, made, a, field, folder, items):
+        """Starts a runner, sends the meshes, asks the first question, and tells whether the runner takes part."""
+        runner.start()
+        record = {"runner": runner.name, "pair": name, "triangles": {mesh: len(faces) for mesh, (_, faces) in made.items()}, "meshes": {}}
+        for mesh, (corners, faces) in made.items():
+            file = folder / f"{len(list(folder.iterdir()))}.mesh"
+            file.write_bytes(forms.content(corners, faces))
+            answer = runner.send("mesh", {"mesh": mesh, "file": str(file), "corners": len(corners), "triangles": len(faces)})
+            if answer.get("refused"):
+                return False
+            record["meshes"][mesh] = {key: answer.get(key) for key in ("seconds", "open_seconds", "bytes")}
+        if field:
+            numbers, rows = forms.instances(field)
+            sent = {"field": a, "meshes": field["meshes"], "instances": [[n, row] for n, row in zip(numbers, rows)]}
+            record["field_seconds"] = runner.send("field", sent)["seconds"]
+        b = forms.catalogue()["pairs"][name][1]
+        found = runner.ask(FIRST[0], a, b, items[FIRST[1]][:1], self.arguments.budget) if FIRST[0] in runner.profile["timed"] else None
+        self.write(record | {"first_nanoseconds": found["nanoseconds"][0] if found else None})
+        return True
+
+    def profile_of(self, runner):
+        if runner.profile is None:
+            runner.start()
+            runner.stop()
+        return runner.profile
+
+    def round(self, runner, name, number, what, preset, a, b, items, size):
+        answer = runner.ask(what, a, b, items, self.arguments.budget)
+        if answer is None:
+            return True
+        wrong = [k for k, (found, (_, fact)) in enumerate(zip(answer["answers"], items)) if not is_right(what, found, fact, size, runner.profile)]
+        self.wrong, self.asked = self.wrong + len(wrong), self.asked + len(answer["answers"])
+        record = {"runner": runner.name, "pair": name, "round": number, "ask": what, "preset": preset, "nanoseconds": answer["nanoseconds"], "wrong": wrong}
+        self.write(record | ({"answers": answer["answers"]} if number == 0 or wrong else {}))
+        return True
+
+    def batches(self, name, folder):
+        """Asks runners that answer many poses in one call, on all cores."""
+        known = forms.catalogue()
+        a, b = known["pairs"][name]
+        if a in known["fields"]:
+            return
+        items = [item for _ in range(20) for item in poses.load(name)["1%"]]
+        for runner in self.runners:
+            if self.profile_of(runner).get("batch"):
+                self.attempt(runner, name, self.batch, Runner(runner.name, runner.unpinned), name, a, b, items, folder)
+
+    def batch(self, runner, name, a, b, items, folder):
+        """Asks one runner about many poses in one call, without pinning it."""
+        runner.start()
+        try:
+            for mesh in {a, b}:
+                corners, faces = forms.make(forms.catalogue()["meshes"][mesh])
+                file = folder / f"{mesh}.all"
+                file.write_bytes(forms.content(corners, faces))
+                runner.send("mesh", {"mesh": mesh, "file": str(file), "corners": len(corners), "triangles": len(faces)})
+            for what in runner.profile["batch"]:
+                found = [runner.ask(what, a, b, items, self.arguments.budget, batch=True) for _ in range(self.arguments.rounds)]
+                best = min(answer["seconds"] for answer in found)
+                self.write({"runner": runner.name, "pair": name, "batch": what, "preset": "1%", "queries": len(items), "seconds": best, "threads": found[0]["threads"]})
+        finally:
+            runner.stop()
+        return True
+
+
+def machine():
+    """Returns the name of the processor, as well as the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def chosen_runners(arguments):
+    """Returns the runners to ask. Those that are not installed are named."""
+    prefix = f"taskset -c {arguments.core} " if arguments.core is not None else ""
+    if arguments.runner:
+        return [Runner(*one.split("=", 1), prefix) for one in arguments.runner]
+    found = []
+    for name, command, installs in RUNNERS:
+        command = command.format(suite=shlex.quote(str(SUITE)), bin=shlex.quote(arguments.bin), python=shlex.quote(sys.executable))
+        runner = Runner(name, command, prefix)
+        try:
+            if shutil.which(shlex.split(command)[0]) is None:
+                raise FileNotFoundError
+            runner.start()
+            found.append(runner)
+        except (Crashed, Hung, Garbage, OSError):
+            print(f"{name}: skipped, it needs {installs}", file=sys.stderr)
+        runner.stop()
+    return found
+
+
+def main(argv=None):
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True, help="the folder for the raw times, the tables and the plots")
+    parser.add_argument("--page", help="the file of the page with the tables; DIR/SPEED.md")
+    parser.add_argument("--runner", action="append", metavar="NAME=COMMAND", help="ask this runner only; may be repeated")
+    parser.add_argument("--bin", default="target/speed/bin", help="the folder of the runners that setup has built")
+    parser.add_argument("--only", default="", help="only pairs with one of these texts in their name, separated by commas")
+    parser.add_argument("--rounds", type=int, default=5, help="rounds after the first, which counts as cold")
+    parser.add_argument("--sample", type=int, default=1, metavar="N", help="every Nth pose")
+    parser.add_argument("--budget", type=float, default=1.0, help="seconds after which a round of one question begins no other pose")
+    parser.add_argument("--core", type=int, help="the core to which runners are pinned, where there is taskset")
+    parser.add_argument("--smoke", action="store_true", help="few poses of small pairs: does everything work?")
+    arguments = parser.parse_args(argv)
+    if arguments.smoke:
+        arguments.rounds, arguments.sample, arguments.only = 1, 10, ",".join(SMOKE)
+    runners = chosen_runners(arguments)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    began = time.monotonic()
+    with open(arguments.out / "times.jsonl", "w", encoding="utf-8") as output, tempfile.TemporaryDirectory() as folder:
+        measurement = Measurement(arguments, runners, output)
+        try:
+            profiles = {runner.name: {key: measurement.profile_of(runner).get(key) for key in ("name", "version", "settings")} for runner in runners}
+            suite = (SUITE / "VERSION").read_text(encoding="utf-8").strip()
+            measurement.write({"date": str(datetime.date.today()), "processor": machine(), "system": platform.system(), "pinned": arguments.core is not None, "rounds": arguments.rounds, "suite": suite, "runners": profiles})
+            for name in forms.catalogue()["pairs"]:
+                if any(text in name for text in arguments.only.split(",")):
+                    try:
+                        measurement.pair(name, Path(folder))
+                        measurement.batches(name, Path(folder))
+                        print(f"{name}: done after {time.monotonic() - began:.0f} s", file=sys.stderr)
+                    except forms.Missing as missing:
+                        print(f"{name}: skipped, {missing}", file=sys.stderr)
+        except (Crashed, Hung, Garbage, OSError, ValueError) as failure:
+            print(f"expected runners that answer, found {type(failure).__name__} {failure}", file=sys.stderr)
+            return 2
+        finally:
+            for runner in runners:
+                runner.stop()
+    page = arguments.page or str(arguments.out / "SPEED.md")
+    report.main([str(arguments.out), "--page", page])
+    print(f"{measurement.asked} answers, {measurement.wrong} wrong, {measurement.failed} runners failed; see {page}")
+    return 0 if measurement.asked and not measurement.wrong and not measurement.failed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,162 @@
+"""The bounds of gaps are right on random triangles, poses are proved again, and a runner that lies is found out in the tables."""
+
+import contextlib
+import io
+import json
+import os
+import random
+import shlex
+import subprocess
+import sys
+import tempfile
+import unittest
+from fractions import Fraction
+from pathlib import Path
+
+SUITE = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(SUITE / "speed"), str(SUITE)]
+
+try:
+    import numpy as np
+
+    import forms
+    import gaps
+    import poses
+except ModuleNotFoundError as missing:
+    raise unittest.SkipTest(f"numpy is missing: {missing}") from None
+
+import report
+import truth
+
+RUN = SUITE / "speed" / "run.py"
+
+
+def soup(count, seed, reach):
+    """Returns random triangles on a grid of 1/8, every third a segment."""
+    source = random.Random(seed)
+    corners = np.array([[source.randint(-reach, reach) / 8 for _ in range(3)] for _ in range(3 * count)], np.float32)
+    corners[6::9] = corners[7::9]
+    return corners, np.arange(3 * count).reshape(-1, 3)
+
+
+def exactly(corners, faces, pose):
+    """Returns the placed triangles as integers in units of 2^-60, which no pose of these tests rounds."""
+    rows = [list(map(Fraction, pose[k : k + 4])) for k in (0, 4, 8)]
+    at = [tuple(int((sum(r * Fraction(float(x)) for r, x in zip(row, p)) + row[3]) * 2**60) for row in rows) for p in corners]
+    return [tuple(at[i] for i in face) for face in faces.tolist()]
+
+
+class Gaps(unittest.TestCase):
+    def test_bounds_and_contacts_are_those_of_the_exact_search(self):
+        touching = 0
+        for seed in range(60):
+            a, b = soup(1 + seed % 13, seed, 20), soup(1 + seed % 9, seed + 1000, 12)
+            shift = [0.0, 0.5, 3.0, 2.0**-20][seed % 4]
+            pose = [0.6, -0.8, 0.0, shift, 0.8, 0.6, 0.0, 0.25 + shift, 0.0, 0.0, 1.0, 4.0 * shift]
+            # 0.6 and 0.8 are multiples of 2^-54: with coordinates on the grid of 1/8, the units of 2^-60 hold everything.
+            t, u = exactly(*a, [1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0]), exactly(*b, pose)
+            of_a, of_b = gaps.Tree(*a).placed(None), gaps.Tree(*b).placed(pose)
+            square = truth.squared_distance(t, u) / 4**60
+            lower, upper = gaps.bounds(of_a, of_b)
+            self.assertTrue(Fraction(lower) ** 2 <= square <= Fraction(upper) ** 2, (seed, lower, upper, float(square)))
+            self.assertLess(upper - lower, 1e-12, seed)
+            self.assertEqual(sorted(map(list, gaps.contacts(of_a, of_b))), truth.contacts(t, u), seed)
+            touching += square == 0
+        self.assertTrue(10 < touching < 50, touching)
+
+    def test_a_mesh_whose_bytes_change_is_refused(self):
+        record = forms.catalogue()["meshes"]["scan-1k"]
+        self.assertEqual(len(forms.make(record)[1]), record["triangles"])
+        with self.assertRaises(ValueError):
+            forms.make(record | {"arguments": [9, 2]})
+
+    def test_an_instance_is_where_its_pose_says(self):
+        known = forms.catalogue()
+        field = known["fields"]["field-512"] | {"side": 2}
+        corners, faces, owners = forms.flattened(field, known["meshes"])
+        numbers, rows = forms.instances(field)
+        for owner, (number, row) in enumerate(zip(numbers, rows)):
+            points, triangles = forms.make(known["meshes"][field["meshes"][number]])
+            expected = gaps.moved(points.astype(float)[triangles], row)
+            self.assertTrue(np.array_equal(corners[faces[owners == owner]], expected))
+            self.assertGreater(np.linalg.det(np.array(row).reshape(3, 4)[:, :3]), 0.5)
+
+
+class Poses(unittest.TestCase):
+    def test_they_are_proved_again_and_a_changed_bound_is_found(self):
+        # Every fourth of 20 poses at 8 presets.
+        self.assertEqual(poses.check("scan-1k", 4), (40, []))
+        lines = [json.loads(line) for line in poses.path("scan-1k").read_text(encoding="utf-8").splitlines()]
+        for line in lines:
+            line["1%"]["lower"] = (float.fromhex(line["1%"]["lower"]) * (1 + 1e-9)).hex()
+            line["deep"]["contacts"] += 1
+        with tempfile.TemporaryDirectory() as folder:
+            changed = Path(folder) / "scan-1k.jsonl"
+            changed.write_text("\n".join(map(json.dumps, lines)), encoding="utf-8")
+            original, poses.path = poses.path, lambda pair: changed
+            try:
+                self.assertEqual(len(poses.check("scan-1k", 4)[1]), 10)
+            finally:
+                poses.path = original
+
+
+def timed(folder, *arguments):
+    """Runs a smoke test of the runner of these tests, and returns the exit code and the page."""
+    command = [sys.executable, str(SUITE / "tests" / "gaps_runner.py"), *arguments]
+    joined = shlex.join(command) if os.name == "posix" else subprocess.list2cmdline(command)
+    done = subprocess.run([sys.executable, str(RUN), "--out", folder, "--smoke", "--runner", f"gaps={joined}"], capture_output=True, text=True, check=False)
+    return done.returncode, (Path(folder) / "SPEED.md").read_text(encoding="utf-8") if done.returncode != 2 else done.stderr
+
+
+class Runs(unittest.TestCase):
+    def test_an_honest_runner_is_timed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, page = timed(folder)
+            self.assertEqual(code, 0, page)
+            self.assertIn("No answers are wrong", page)
+            self.assertIn("| scan-1k | touching | **", page)
+            self.assertTrue((Path(folder) / "distance-scan-1k.svg").read_text(encoding="utf-8").startswith("<svg"))
+
+    def test_a_liar_is_marked_and_never_best(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, page = timed(folder, "7")
+            self.assertEqual(code, 1)
+            self.assertIn("of 2 wrong", page)
+
+    def test_a_runner_that_ends_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, page = timed(folder, "-9")
+            self.assertEqual(code, 1)
+            self.assertIn("- gaps failed on scan-1k: `Crashed`", page)
+
+    def test_a_runner_that_says_nothing_is_an_error(self):
+        with tempfile.TemporaryDirectory() as folder:
+            command = f"silent={shlex.quote(sys.executable)} -c pass"
+            with contextlib.redirect_stderr(io.StringIO()):
+                done = subprocess.run([sys.executable, str(RUN), "--out", folder, "--smoke", "--runner", command], capture_output=True, check=False)
+            self.assertEqual(done.returncode, 2)
+
+
+class Reports(unittest.TestCase):
+    def test_losses_come_first_and_wrong_answers_do_not_win(self):
+        head = {"date": "2026-01-01", "processor": "P", "system": "S", "pinned": True, "rounds": 2, "suite": "1", "runners": {n: {"version": "1", "settings": "s"} for n in ("cbvh", "x", "y")}}
+        costs = lambda seconds: {"meshes": {"m": {"seconds": seconds, "open_seconds": None, "bytes": 1000}}, "first_nanoseconds": 5000, "triangles": {"m": 10}}
+        lines = [head, {"runner": "cbvh", "pair": "p", **costs(0.2)}, {"runner": "x", "pair": "p", **costs(0.1)}]
+        for name, nanoseconds, wrong in (("cbvh", 2000, []), ("x", 1000, []), ("y", 10, [1])):
+            for number in range(3):
+                # The first round is cold and does not count.
+                times = [nanoseconds * (100 if number == 0 else 1)] * 2
+                lines.append({"runner": name, "pair": "p", "round": number, "ask": "collide", "preset": "1%", "nanoseconds": times, "wrong": wrong})
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "times.jsonl").write_text("\n".join(map(json.dumps, lines)), encoding="utf-8")
+            report.main([folder])
+            page = (Path(folder) / "SPEED.md").read_text(encoding="utf-8")
+        self.assertIn("In 1 of 1 comparisons of queries", page)
+        self.assertIn("| collide | p | 1% | 2.00 | x | 1.00 | 2.00 |", page)
+        self.assertIn("| p | 1% | 2.00 (2.00) | **1.00 (1.00)** | 0.01, 1 of 2 wrong | 0.5 |", page)
+        self.assertIn("| p | build, ms | 200 | x | 100 |", page)
+        self.assertLess(page.index("loses"), page.index("Do the two touch?"))
+
+
+if __name__ == "__main__":
+    unittest.main()
