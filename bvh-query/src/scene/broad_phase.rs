@@ -107,8 +107,10 @@ impl BroadPhase {
         budget: &mut Budget,
         mut visit: impl FnMut(u32, u32, f64) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, QueryError> {
+        // Room for most searches, so that they allocate once.
+        let mut open = Vec::with_capacity(64);
         for trees in [(&self.still, &self.still), (&self.moving, &self.still), (&self.moving, &self.moving)] {
-            if pairs(trees, limit, budget, &mut visit)?.is_break() {
+            if pairs(trees, limit, budget, &mut open, &mut visit)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
@@ -259,11 +261,12 @@ impl Tree {
     }
 }
 
-/// Visits the near pairs of two trees, or of one tree with itself, until `visit` breaks.
+/// Visits the near pairs of two trees, or of one tree with itself, until `visit` breaks. `open` is empty at first.
 fn pairs(
     (a, b): (&Tree, &Tree),
     limit: f64,
     budget: &mut Budget,
+    open: &mut Vec<(u32, u32)>,
     visit: &mut impl FnMut(u32, u32, f64) -> ControlFlow<()>,
 ) -> Result<ControlFlow<()>, QueryError> {
     if a.nodes.is_empty() || b.nodes.is_empty() {
@@ -271,7 +274,7 @@ fn pairs(
     }
     let is_one = std::ptr::eq(a, b);
     let squared_limit = limit * limit;
-    let mut open: Vec<(u32, u32)> = vec![(0, 0)];
+    open.push((0, 0));
     while let Some((first, second)) = open.pop() {
         budget.visit()?;
         let (node_a, node_b) = (&a.nodes[first as usize], &b.nodes[second as usize]);

@@ -313,7 +313,8 @@ impl Scene {
     /// [`InstanceError::NoInstance`], or [`InstanceError::Pose`] as for [`Scene::add`], also for a pose to which an
     /// attached instance would follow. Then nothing has moved.
     pub fn set_pose(&mut self, id: InstanceId, world: Pose) -> Result<(), InstanceError> {
-        self.set_poses([(id, world)])
+        self.contents.check_pose(id, &world)?;
+        self.move_to(&[(id.place, world)])
     }
 
     /// Moves many instances. If an instance is named twice, the last pose counts. Otherwise their order does not matter:

@@ -188,56 +188,6 @@ def slabs(t, u, at_t, at_u, size):
     return np.where(width > 0.0, width / (1.0 + 2.0**-48), width) - SLAB_ERROR * size
 
 
-def float_gap(a, b):
-    """Returns the distance in floats, 0 if the meshes seem to touch, and the direction from A to B there. Proves nothing."""
-    i, j, _ = near_pairs(a, b)
-    distances, at_a, at_b, crosses = nearest_points(a.triangles[i], b.triangles[j])
-    if crosses.any():
-        return 0.0, None
-    k = int(np.argmin(distances))
-    return float(distances[k]), (at_b[k] - at_a[k]) / max(distances[k], sys.float_info.min)
-
-
-def exact_pair(a, b, i, j):
-    """Returns the triangles of two leaves as integers, and the bits of their unit."""
-    bits = max(a.bits, b.bits)
-    return a.exact(i, bits), b.exact(j, bits), bits
-
-
-def exact_distance(a, b, i, j):
-    """Returns two neighbouring floats between which the distance of two leaves is: 0 and 0 if they touch."""
-    t, u, bits = exact_pair(a, b, i, j)
-    return (0.0, 0.0) if truth.triangles_meet(t, u) else root_bounds(Fraction(*truth.triangles_apart(t, u)) / 4**bits)
-
-
-def ranked(a, b, reach=None):
-    """Returns near pairs of leaves, lower bounds of their distances, the least first, and what bounds the other pairs.
-
-    The bounds are slabs: between the centres of each pair, or in the direction in which a pair is nearest, which suits most others.
-    """
-    i, j, bound = near_pairs(a, b, reach)
-    t, u, size = a.triangles[i], b.triangles[j], a.size + b.size
-    lowers = slabs(t, u, t.sum(1) / 3.0, u.sum(1) / 3.0, size)
-    if len(i):
-        corners_apart = length(t[:, 0] - u[:, 0])
-        first = np.argsort(corners_apart, kind="stable")[:FIRST]
-        distances, at_a, at_b, _ = nearest_points(t[first], u[first])
-        k = np.argmin(distances)
-        lowers = np.maximum(lowers, slabs(t, u, at_a[k][None], at_b[k][None], size))
-    order = np.argsort(lowers, kind="stable")
-    return i[order], j[order], lowers[order], bound
-
-
-def float_gap(a, b):
-    """Returns the distance in floats, 0 if the meshes seem to touch, and the direction from A to B there. Proves nothing."""
-    i, j, _ = near_pairs(a, b)
-    distances, at_a, at_b, crosses = nearest_points(a.triangles[i], b.triangles[j])
-    if crosses.any():
-        return 0.0, None
-    k = int(np.argmin(distances))
-    return float(distances[k]), (at_b[k] - at_a[k]) / max(distances[k], sys.float_info.min)
-
-
 def exact_pair(a, b, i, j):
     """Returns the triangles of two leaves as integers, and the bits of their unit."""
     bits = max(a.bits, b.bits)
