@@ -23,6 +23,8 @@ QUESTIONS = {
     "contacts": "Which pairs of triangles touch?",
     "touched": "How many instances of the field does the mesh touch?",
 }
+# What the summary is about: meshes that just touch, that are just apart, and that are near.
+SHORT = (("collide", "touching"), ("collide", "0.0001%"), ("distance", "1%"))
 SCALING = ("scan-1k", "scan-10k", "scan-100k")
 
 
@@ -93,6 +95,22 @@ def ratio(row, subject):
 def ordered(cells, question):
     pairs = list(dict.fromkeys(pair for _, pair, _ in cells))
     return sorted((key for key in cells if key[0] == question), key=lambda key: (pairs.index(key[1]), PRESETS.index(key[2])))
+
+
+def summary(builds, cells, subject):
+    """Returns a row for each pair: the subject beside the best other library, where most is to be done."""
+    rows = []
+    triangles = {record["pair"]: record["triangles"].values() for record in builds}
+    for pair, counts in triangles.items():
+        row = [pair, ", ".join(f"{count:,}" for count in counts)]
+        for question, preset in SHORT:
+            of = cells.get((question, pair, preset), {})
+            other = best_other(of, subject)
+            row.append(microseconds(of[subject].median) if subject in of else "")
+            row.append(f"{microseconds(other[0])}, {other[1]}" if other else "")
+        rows.append(row)
+    heads = [name for question, preset in SHORT for name in (f"{question} at {preset}", "best other")]
+    return table(["pair", "triangles", *heads], rows)
 
 
 def losses(cells, subject):
@@ -213,7 +231,7 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
              "Times are medians over the poses in microseconds, with the 99th percentile of all single queries in brackets. Each answer is compared with what is",
              f"proved. {wrong or 'No'} answers are wrong, counted once for each pose, and a library with a wrong answer in a cell is not counted as best there. The fastest library that is right is in",
              f"bold. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away: there, `collide` shows what a call costs. [What is timed]({readme})", "",
-             f"## Where {subject} loses", ""]  # fmt: skip
+             "## In short", "", *summary(builds, cells, subject), "", f"## Where {subject} loses", ""]  # fmt: skip
     if lost:
         lines += [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
     else:

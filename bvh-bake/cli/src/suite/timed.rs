@@ -96,7 +96,7 @@ pub(super) fn ask(
     let instance = field.moving(name, b)?;
     let scene = &mut field.scene;
     one_by_one(question, &poses, |pose| {
-        scene.set_pose(instance, pose.clone()).map_err(text)?;
+        scene.set_pose(instance, *pose).map_err(text)?;
         match question.ask.as_str() {
             "collide" => scene.collide().map(f64::from).map_err(text),
             "touched" => scene.pairs_in_contact().map(|found| found.len() as f64).map_err(text),
