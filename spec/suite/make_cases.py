@@ -84,8 +84,13 @@ BROKEN = {
 MAX_INLINE = 40
 
 
+def kept(file):
+    """Returns the lines of a file of cases as they are."""
+    return [json.loads(line) for line in (CASES / file).read_text(encoding="utf-8").splitlines()]
+
+
 def mesh_records():
-    """Returns the lines of `meshes.jsonl` by name."""
+    """Returns the lines of `meshes.jsonl` by name. Meshes of hard pairs come from no rule, and are kept."""
     records = {}
     for name, (maker, arguments, *rest) in {**CLOSED, **OTHERS, **DEGENERATE, **SCALED, **SLIVERS}.items():
         points, triangles = meshes.make(maker, arguments, *rest)
@@ -101,7 +106,7 @@ def mesh_records():
     for name, (vertices, triangles) in {**BROKEN, "empty": ([], [])}.items():
         record = {"mesh": name, "triangle_count": len(triangles), "vertices": vertices, "triangles": triangles}
         records[name] = record | {"sha256": meshes.content_hash(vertices, triangles)}
-    return records
+    return records | {record["mesh"]: record for record in kept("meshes.jsonl") if record["mesh"].startswith("hard-")}
 
 
 RECORDS = mesh_records()
@@ -453,6 +458,15 @@ def hexes(point):
     return [to_hex(float(x)) for x in point]
 
 
+def make_hard(maker):
+    """Adds the pairs of small meshes that are in `hard.jsonl`: each was thought of by itself."""
+    for case in kept("hard.jsonl"):
+        if case["ask"] == "collide":
+            features = sorted({"degenerate", "range"} & set(case["needs"]["features"]))
+            poses = [item["pose"] for item in case["items"]]
+            maker.pairs("hard", (case["a"], case["b"]), poses, case["reason"], case["tags"][:-1], 3, features, ("collide", "distance", "contacts"))
+
+
 def make_probes(maker):
     random = meshes.Random(500)
     solids = [n for n in CLOSED] + ["inside-out", "overlapping-boxes", "nested-boxes"]
@@ -531,7 +545,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     jobs = parser.parse_args().jobs
     maker = Maker()
-    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_probes, make_motions, make_depths, make_self_contacts):
+    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_self_contacts):
         make(maker)
     CASES.mkdir(exist_ok=True)
     cases = [case for of in maker.cases.values() for case in of]

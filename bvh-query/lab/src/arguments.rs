@@ -13,28 +13,8 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Experiment {
-    /// Ask cbvh and other libraries hard questions with known answers
-    Hard(HardArguments),
     /// Search for wrong answers for hours: pairs near the boundary of contact, and forged files
     Search(SearchArguments),
-}
-
-/// Writes hard.md and hard.json. Each case is a pair of small meshes in a pose whose answer is known exactly. It is
-/// asked in every profile, in both lossless triangle encodings and on every backend of this CPU. In a fifth of these,
-/// it is also asked with corners, triangles and sides in other orders. If an answer of cbvh is wrong, the exit code is
-/// 1; the files are still written.
-#[derive(Debug, Args)]
-pub(crate) struct HardArguments {
-    /// The folder to write to; it is created if it does not exist
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// A build of programs that ask other libraries: DIR/bin/peer_*. They take two OBJ files, a pose file, --mode, --bv
-    /// and --out as `cbvh query` does. Their wrong answers are listed and do not change the exit code
-    #[arg(long, value_name = "DIR")]
-    pub(crate) peers: Option<PathBuf>,
-    /// Ask only about every N-th case
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(1..=250))]
-    pub(crate) every: u16,
 }
 
 /// The search does the rounds that its record lacks. The number of a round determines everything in it. Each round adds

@@ -15,7 +15,6 @@ mod exact {
     pub(crate) mod tally;
     pub(crate) mod truth;
 }
-mod hard;
 mod output;
 mod search;
 
@@ -28,7 +27,6 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 fn main() -> ExitCode {
     let result = match &Arguments::parse().experiment {
-        Experiment::Hard(arguments) => hard::run(arguments),
         Experiment::Search(arguments) => search::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {

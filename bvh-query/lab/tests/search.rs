@@ -1,9 +1,23 @@
 //! Tests `cbvh-lab search`: it goes on where its record ends, repeats a round, and refuses a record that is none.
 
-mod common;
-
-use common::{lab, names};
 use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs `cbvh-lab` with these arguments.
+fn lab(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh-lab"));
+    command.args(arguments).env_remove("CBVH_ISA").output().unwrap()
+}
+
+/// Returns the sorted names in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort_unstable();
+    names
+}
 
 #[test]
 fn a_search_does_the_rounds_that_its_record_lacks() {
