@@ -24,7 +24,7 @@ QUESTIONS = {
     "touched": "How many instances of the field does the mesh touch?",
 }
 # What the summary is about: meshes that just touch, that are just apart, and that are near.
-SHORT = (("collide", "touching"), ("collide", "0.0001%"), ("distance", "1%"))
+SHORT = {("collide", "touching"): "collide, touching", ("collide", "0.0001%"): "collide, 0.0001 % apart", ("distance", "1%"): "distance, 1 % apart"}
 SCALING = ("scan-1k", "scan-10k", "scan-100k")
 
 
@@ -109,7 +109,7 @@ def summary(builds, cells, subject):
             row.append(microseconds(of[subject].median) if subject in of else "")
             row.append(f"{microseconds(other[0])}, {other[1]}" if other else "")
         rows.append(row)
-    heads = [name for question, preset in SHORT for name in (f"{question} at {preset}", "best other")]
+    heads = [name for title in SHORT.values() for name in (title, "best other")]
     return table(["pair", "triangles", *heads], rows)
 
 
@@ -252,22 +252,28 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
     return lines
 
 
+def made(folder, place, subject=None):
+    """Returns the plots of the raw times in a folder, by name, and the page that is to be in a place."""
+    head, builds, batches, failed, cells = read(folder)
+    names = list(head["runners"])
+    subject = subject or ("cbvh" if "cbvh" in names else names[0])
+    drawn = plots(cells, names)
+    to_folder, readme = (Path(os.path.relpath(to, place.parent)).as_posix() for to in (folder, Path(__file__).parent / "README.md"))
+    lines = page(head, builds, batches, failed, cells, subject, drawn, "" if to_folder == "." else to_folder + "/", readme)
+    return drawn, "\n".join(lines) + "\n"
+
+
 def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--page", type=Path, help="the file of the page; DIR/SPEED.md")
     parser.add_argument("--subject", help="the library that ratios are about; cbvh, or the first one")
     arguments = parser.parse_args(argv)
-    head, builds, batches, failed, cells = read(arguments.folder)
-    names = list(head["runners"])
-    subject = arguments.subject or ("cbvh" if "cbvh" in names else names[0])
-    drawn = plots(cells, names)
-    for file, text in drawn.items():
-        (arguments.folder / file).write_text(text, encoding="utf-8")
-    file = arguments.page or arguments.folder / "SPEED.md"
-    folder, readme = (Path(os.path.relpath(to, file.parent)).as_posix() for to in (arguments.folder, Path(__file__).parent / "README.md"))
-    lines = page(head, builds, batches, failed, cells, subject, drawn, "" if folder == "." else folder + "/", readme)
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    place = arguments.page or arguments.folder / "SPEED.md"
+    drawn, text = made(arguments.folder, place, arguments.subject)
+    for file, plotted in drawn.items():
+        (arguments.folder / file).write_text(plotted, encoding="utf-8")
+    place.write_text(text, encoding="utf-8")
     return 0
 
 

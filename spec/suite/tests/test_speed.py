@@ -46,6 +46,14 @@ def exactly(corners, faces, pose):
     return [tuple(at[i] for i in face) for face in faces.tolist()]
 
 
+class Page(unittest.TestCase):
+    def test_the_page_has_the_tables_of_the_raw_times(self):
+        drawn, text = report.made(SUITE / "speed" / "results", SUITE / "SPEED.md")
+        self.assertEqual((SUITE / "SPEED.md").read_text(encoding="utf-8"), text)
+        for file, plotted in drawn.items():
+            self.assertEqual((SUITE / "speed" / "results" / file).read_text(encoding="utf-8"), plotted, file)
+
+
 class Gaps(unittest.TestCase):
     def test_bounds_and_contacts_are_those_of_the_exact_search(self):
         touching = 0
