@@ -154,6 +154,8 @@ fn timed_questions_have_a_time_for_each_pose() {
         asked("u", "collide"),
         mesh(5),
         asked("t", "collide"),
+        json!({"mesh": "t", "file": file, "corners": u64::MAX, "triangles": 4}),
+        json!({"mesh": "t", "file": place.join("none"), "corners": 4, "triangles": 4}),
     ]);
     assert!(
         answers[0]["seconds"].as_f64().unwrap() > 0.0 && answers[0]["open_seconds"].as_f64().unwrap() > 0.0
@@ -178,6 +180,16 @@ fn timed_questions_have_a_time_for_each_pose() {
     for answer in &answers[9..] {
         assert_eq!(answer["refused"], json!(true), "{answer}");
     }
+    // A budget of any size, and a mesh that is sent again while its file is mapped.
+    let budget = |seconds: f64| {
+        let mut question = asked("t", "collide");
+        question["budget"] = json!(seconds);
+        question
+    };
+    let answers = talk(&[mesh(4), mesh(4), budget(-1.0), budget(0.0), budget(1e300)]);
+    let counts: Vec<_> =
+        answers[2..].iter().map(|answer| answer["answers"].as_array().unwrap().len()).collect();
+    assert_eq!(counts, [1, 1, 2]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::message::{MeshFile, MeshMessage};
 use crate::console::{Record, record};
 use crate::process;
 use bvh_bake::mesh::Mesh;
-use bvh_bake::{Options, to_bytes};
+use bvh_bake::{Options, to_bytes, write_atomically};
 use bvh_query::{Bvh, ReadAhead};
 use std::collections::HashMap;
 use std::fs;
@@ -54,25 +54,27 @@ fn bake(message: &MeshMessage) -> Result<Bvh, String> {
 
 /// Bakes and maps the mesh of a file. Returns it with the seconds of the bake, of the opening, and the bytes of the baked file.
 fn bake_file(message: &MeshFile) -> Result<(Bvh, Record), String> {
-    let bytes = fs::read(&message.file).map_err(|error| error.to_string())?;
-    let (corners, triangles) = bytes.split_at_checked(12 * message.corners).ok_or("expected more corners")?;
-    let number = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
-    let points = |bytes: &[u8]| [0, 4, 8].map(|at| f64::from(f32::from_le_bytes(number(&bytes[at..]))));
-    let indices = |bytes: &[u8]| [0, 4, 8].map(|at| u32::from_le_bytes(number(&bytes[at..])));
-    let corners = corners.chunks_exact(12).map(points).collect();
-    let triangles: Vec<_> = triangles.chunks_exact(12).map(indices).collect();
-    if triangles.len() != message.triangles {
-        return Err(format!("expected {} triangles, found {}", message.triangles, triangles.len()));
+    let name = message.file.display();
+    let bytes = fs::read(&message.file).map_err(|error| format!("{name}: cannot read: {error}"))?;
+    let expected = (message.corners.saturating_add(message.triangles)).saturating_mul(12);
+    if bytes.len() != expected {
+        return Err(format!("{name}: expected {expected} bytes, found {}", bytes.len()));
     }
+    let (numbers, _) = bytes.as_chunks::<4>();
+    let (rows, _) = numbers.as_chunks::<3>();
+    let (corners, triangles) = rows.split_at(message.corners);
+    let corners = corners.iter().map(|row| row.map(|x| f64::from(f32::from_le_bytes(x)))).collect();
+    let triangles = triangles.iter().map(|row| row.map(u32::from_le_bytes)).collect();
     let start = Instant::now();
     let mesh = Mesh::from_triangles(corners, triangles);
-    let (bytes, _) = to_bytes(&mesh, &Options::default()).map_err(|error| error.to_string())?;
+    let (baked, _) = to_bytes(&mesh, &Options::default()).map_err(|error| error.to_string())?;
     let seconds = start.elapsed().as_secs_f64();
+    // The mesh may be sent again while the file of the first time is mapped: that one is replaced, not written to.
     let path = message.file.with_extension("cbvh");
-    fs::write(&path, &bytes).map_err(|error| error.to_string())?;
+    write_atomically(&path, &baked).map_err(|error| error.to_string())?;
     let start = Instant::now();
     let bvh = process::map(&path, ReadAhead::Usual).map_err(|error| error.to_string())?;
     let open_seconds = start.elapsed().as_secs_f64();
-    let record = record! { triangles: message.triangles, seconds: seconds, open_seconds: open_seconds, bytes: bytes.len() };
+    let record = record! { triangles: message.triangles, seconds: seconds, open_seconds: open_seconds, bytes: baked.len() };
     Ok((bvh, record))
 }

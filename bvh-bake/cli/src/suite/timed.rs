@@ -8,7 +8,7 @@ use super::message::{FieldMessage, TimedQuestion};
 use crate::console::{Record, record};
 use bvh_query::{Batch, Bvh, Groups, InstanceId, Pose, Querier, Scene};
 use std::collections::HashMap;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Still instances, which are asked about moving ones only.
 const STILL: Groups = Groups { member: 1, meets: 2 };
@@ -115,14 +115,13 @@ fn one_by_one<E: ToString>(
     mut ask: impl FnMut(&Pose) -> Result<f64, E>,
 ) -> Result<Record, String> {
     let began = Instant::now();
-    let budget = Duration::from_secs_f64(question.budget);
     let (mut answers, mut nanoseconds) = (Vec::new(), Vec::new());
     for pose in poses {
         let start = Instant::now();
         let answer = ask(pose);
         nanoseconds.push(start.elapsed().as_nanos() as u64);
         answers.push(answer.map_err(text)?);
-        if began.elapsed() > budget {
+        if began.elapsed().as_secs_f64() > question.budget {
             break;
         }
     }

@@ -1,6 +1,6 @@
 // Coal: a BVHModel of the bounding volume that the argument names, without security margin and break distance.
 
-#include "native.hpp"
+#include "fields.hpp"
 
 #include <coal/BVH/BVH_model.h>
 #include <coal/broadphase/broadphase_dynamic_AABB_tree.h>
@@ -48,16 +48,7 @@ template <class BV> struct Coal {
   static constexpr bool has_fields = true;
 
   static std::shared_ptr<Mesh> mesh(const std::vector<Point>& corners, const std::vector<Face>& faces) {
-    auto made = std::make_shared<Mesh>();
-    std::vector<Vec3s> points;
-    std::vector<Triangle> triangles;
-    for (auto& p : corners) points.emplace_back(p[0], p[1], p[2]);
-    for (auto& t : faces) triangles.emplace_back(t[0], t[1], t[2]);
-    made->beginModel(unsigned(faces.size()), unsigned(corners.size()));
-    made->addSubModel(points, triangles);
-    made->endModel();
-    made->computeLocalAABB();
-    return made;
+    return model<Mesh, Vec3s, Triangle>(corners, faces);
   }
   static Pose pose(const Numbers& m) {
     Matrix3s r;
@@ -86,27 +77,17 @@ template <class BV> struct Coal {
   }
 
   static std::unique_ptr<Object> object(const std::shared_ptr<Mesh>& mesh) { return std::make_unique<Object>(mesh, false); }
-  struct Field {
-    std::vector<std::unique_ptr<Object>> objects;
-    DynamicAABBTreeCollisionManager manager;
-    void add(const std::shared_ptr<Mesh>& mesh, const Pose& pose) {
-      objects.push_back(std::make_unique<Object>(mesh, pose, false));
-      manager.registerObject(objects.back().get());
-    }
-    void finish() { manager.setup(); }
-    static void place(Object& body, const Pose& pose) {
-      body.setTransform(pose);
-      body.computeAABB();
-    }
+  struct Field : Instances<Object, DynamicAABBTreeCollisionManager> {
+    using Field::Instances::manager;
     double touched(Object& body, const Pose& pose, bool all) {
-      place(body, pose);
+      Field::place(body, pose);
       Touched callback;
       callback.is_all = all;
       manager.collide(&body, &callback);
       return double(callback.count);
     }
     double distance(Object& body, const Pose& pose) {
-      place(body, pose);
+      Field::place(body, pose);
       Nearest callback;
       manager.distance(&body, &callback);
       return callback.least;

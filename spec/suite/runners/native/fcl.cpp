@@ -1,6 +1,6 @@
 // FCL: a BVHModel of the bounding volume that the argument names, with default requests.
 
-#include "native.hpp"
+#include "fields.hpp"
 
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/config.h>
@@ -46,16 +46,7 @@ template <class BV> struct Fcl {
   static constexpr bool has_fields = true;
 
   static std::shared_ptr<Mesh> mesh(const std::vector<Point>& corners, const std::vector<Face>& faces) {
-    auto made = std::make_shared<Mesh>();
-    std::vector<Vector> points;
-    std::vector<Triangle> triangles;
-    for (auto& p : corners) points.emplace_back(p[0], p[1], p[2]);
-    for (auto& t : faces) triangles.emplace_back(t[0], t[1], t[2]);
-    made->beginModel(int(faces.size()), int(corners.size()));
-    made->addSubModel(points, triangles);
-    made->endModel();
-    made->computeLocalAABB();
-    return made;
+    return model<Mesh, Vector, Triangle>(corners, faces);
   }
   static Pose pose(const Numbers& m) {
     Pose pose = Pose::Identity();
@@ -85,26 +76,16 @@ template <class BV> struct Fcl {
   }
 
   static std::unique_ptr<Object> object(const std::shared_ptr<Mesh>& mesh) { return std::make_unique<Object>(mesh); }
-  struct Field {
-    std::vector<std::unique_ptr<Object>> objects;
-    DynamicAABBTreeCollisionManagerd manager;
-    void add(const std::shared_ptr<Mesh>& mesh, const Pose& pose) {
-      objects.push_back(std::make_unique<Object>(mesh, pose));
-      manager.registerObject(objects.back().get());
-    }
-    void finish() { manager.setup(); }
-    static void place(Object& body, const Pose& pose) {
-      body.setTransform(pose);
-      body.computeAABB();
-    }
+  struct Field : Instances<Object, DynamicAABBTreeCollisionManagerd> {
+    using Field::Instances::manager;
     double touched(Object& body, const Pose& pose, bool all) {
-      place(body, pose);
+      Field::place(body, pose);
       Touched data{all};
       manager.collide(&body, &data, Touched::ask);
       return double(data.count);
     }
     double distance(Object& body, const Pose& pose) {
-      place(body, pose);
+      Field::place(body, pose);
       Nearest data;
       manager.distance(&body, &data, Nearest::ask);
       return data.least;
