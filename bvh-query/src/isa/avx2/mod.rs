@@ -286,7 +286,8 @@ impl Isa for Avx2 {
     }
 }
 
-/// `_mm256_permutevar_ps`, which compilers replace by slower shuffles across halves when they know the places.
+/// Permutes the lanes of each half, as `_mm256_permutevar_ps` does. Compilers replace that one by slower shuffles across the
+/// halves if they know the places.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn permute_in_halves(value: __m256, places: __m256i) -> __m256 {
