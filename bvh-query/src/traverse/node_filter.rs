@@ -19,12 +19,13 @@ pub(crate) enum Measure {
     Leaving,
 }
 
-/// Lengths of A's directions: 1, sqrt 3, sqrt 2. Their inverses, rounded down.
-pub(super) const INVERSE_LENGTHS: [f32; 13] = {
-    const CUBE: f32 = 0.577_350_2;
-    const FACE: f32 = std::f32::consts::FRAC_1_SQRT_2.next_down();
-    [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE]
-};
+/// The inverse of sqrt 3, the length of directions 3 to 6, rounded down.
+const CUBE: f32 = 0.577_350_2;
+/// The inverse of sqrt 2, the length of directions 7 to 12, rounded down.
+const FACE: f32 = std::f32::consts::FRAC_1_SQRT_2.next_down();
+/// The inverse lengths of all directions.
+pub(super) const INVERSE_LENGTHS: [f32; 13] =
+    [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE];
 
 /// Bounds on the magnitudes of all nodes of an object, from those of its root.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -368,13 +369,21 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Gr
     let zero = isa.splat(0.0);
     let [side_x, side_y, side_z] = [x.max(zero), y.max(zero), z.max(zero)];
     let sum = side_z.mul_add(side_z, side_y.mul_add(side_y, side_x.mul(side_x)));
-    for slab in 3..SLABS {
-        let gap = gap(isa, ends, slab).mul(isa.splat(INVERSE_LENGTHS[slab]));
-        match slab % 3 {
-            0 => x = x.max_of_numbers(gap),
-            1 => y = y.max_of_numbers(gap),
-            _ => z = z.max_of_numbers(gap),
+    if SLABS > 3 {
+        let mut cube = gap(isa, ends, 3);
+        for slab in 4..7 {
+            cube = cube.max_of_numbers(gap(isa, ends, slab));
         }
+        x = x.max_of_numbers(cube.mul(isa.splat(CUBE)));
+    }
+    if SLABS > 7 {
+        // Two maxima side by side, so that none waits for the one before.
+        let [mut even, mut odd] = [gap(isa, ends, 7), gap(isa, ends, 8)];
+        for slab in [9, 11] {
+            even = even.max_of_numbers(gap(isa, ends, slab));
+            odd = odd.max_of_numbers(gap(isa, ends, slab + 1));
+        }
+        y = y.max_of_numbers(even.max_of_numbers(odd).mul(isa.splat(FACE)));
     }
     let largest = x.max_of_numbers(y).max_of_numbers(z);
     // Up to four roundings of the sum and one of the root, each 2^-24 relative, and three squares that
