@@ -1,13 +1,15 @@
 """Bounds the distance of two placed meshes, with proof: closed intervals from boxes, slabs and, where these leave doubt, integers.
 
-A tree of boxes finds the pairs of triangles that may be nearest. An upper bound is the exact distance of one pair (`truth.py`). A
-lower bound of a pair is the width of a slab between its triangles. Any direction of the slab gives a valid bound, so the search for
-a good one need not be exact. What floats round is charged: the two functions that do so derive it. Pairs that no slab separates well
-enough are computed exactly.
+Trees of boxes find the pairs of triangles that may be nearest. The boxes of B turn with B, because those of a fan or of a row of
+slivers are thin in the mesh's own frame only. An upper bound is the exact distance of one pair (`truth.py`). A lower bound of a pair
+is the width of a slab between its triangles or its boxes. Any direction of the slab gives a valid bound, so the search for a good
+one need not be exact. What floats round is charged, as the constants derive. Pairs that no slab separates well enough are computed
+exactly.
 """
 
 import sys
 from fractions import Fraction
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +25,14 @@ EDGES = np.array(truth.EDGES)
 PLACING_ERROR = 2.0**-50
 # A slab is dot products of a direction of length at most 2 with placed corners. Three coordinates, each off by 2^-50 M and multiplied
 # by at most 2, and five roundings of sums of at most 6 M, are below 2^-46 M. A quotient and a difference more are within 2^-45 M.
+# The same holds for slabs between boxes, whose centres and half sides are off by 2^-53 M, and which sum over six half sides.
 SLAB_ERROR = 2.0**-45
-# A lower bound that is less than this part below the upper bound is good enough.
+# Once `FIRST` pairs are computed exactly, a lower bound that is less than this part below the upper bound is good enough.
 SLACK = 1e-9
 # So many of the pairs with the least lower bounds are looked at first.
 FIRST = 512
+# So many pairs are looked at in one go, which bounds the memory.
+CHUNK = 1 << 15
 
 
 class Tree:
@@ -47,29 +52,36 @@ class Tree:
             order = np.take_along_axis(order, np.argsort(keys, axis=1, kind="stable"), 1).reshape(2 * len(order), -1)
         self.order = order.ravel()
         self.triangles = triangles[self.order]
+        self.largest = float(np.abs(triangles).max())
+        # The centres and half sides of the boxes on each level, from the root to the leaves.
+        low, high = self.triangles.min(1), self.triangles.max(1)
+        self.levels = [((low + high) / 2, (high - low) / 2)]
+        for _ in range(self.depth):
+            low, high = np.minimum(low[0::2], low[1::2]), np.maximum(high[0::2], high[1::2])
+            self.levels.append(((low + high) / 2, (high - low) / 2))
+        self.levels.reverse()
 
     def placed(self, pose):
         """Returns this mesh as a `Placed` at the twelve numbers of a pose, or where it is."""
-        return Placed(self, self.triangles if pose is None else moved(self.triangles, pose), pose)
+        return Placed(self, pose)
 
 
 class Placed:
-    """A mesh at a pose: its triangles in floats, their boxes on all levels, and how large its numbers are."""
+    """A mesh at a pose, and how large its numbers are."""
 
-    def __init__(self, tree, triangles, pose):
-        self.tree, self.triangles, self.pose = tree, triangles, pose
-        self.size = float(np.abs(triangles).max())
+    def __init__(self, tree, pose):
+        self.tree, self.pose, self.size, self.bits, self.rotation = tree, pose, tree.largest, tree.bits, np.eye(3)
         if pose is not None:
-            r = np.abs(np.array(pose).reshape(3, 4))
-            self.size = float((r[:, :3].sum(1) * np.abs(tree.triangles).max() + r[:, 3]).max())
-        low, high = triangles.min(1), triangles.max(1)
-        self.levels = [(low, high)]
-        for _ in range(tree.depth):
-            low, high = np.minimum(low[0::2], low[1::2]), np.maximum(high[0::2], high[1::2])
-            self.levels.append((low, high))
-        self.levels.reverse()
+            rows = np.array(pose).reshape(3, 4)
+            self.rotation = rows[:, :3]
+            self.size = float((np.abs(self.rotation).sum(1) * tree.largest + np.abs(rows[:, 3])).max())
+            self.bits += max(map(fraction_bits, pose))
 
-        self.bits = tree.bits + (max(map(fraction_bits, pose)) if pose is not None else 0)
+    def moved(self, points):
+        return points if self.pose is None else moved(points, self.pose)
+
+    def triangles(self, leaves):
+        return self.moved(self.tree.triangles[leaves])
 
     def exact(self, leaf, bits):
         """Returns the corners of the triangle of a leaf as integers, in units of 2^-bits, with no fewer bits than needed."""
@@ -107,30 +119,50 @@ def length(v):
     return np.sqrt(dot(v, v))
 
 
-def near_pairs(a, b, reach=None):
-    """Returns the pairs of leaves whose boxes are at most `reach` apart, or at most a distance that the meshes certainly do not exceed.
+def unit(v):
+    """Returns vectors of length 1, to within 2^-50, or shorter ones where that would divide by nothing."""
+    return v / np.maximum(length(v), 2.0**-400)[..., None]
 
-    The distance of all other pairs is at least the third result.
-    """
-    error = PLACING_ERROR * (a.size + b.size)
+
+def chunks(i, j):
+    """Returns pieces of a list of pairs that are short enough to be looked at in one go: at least one."""
+    return ((i[k : k + CHUNK], j[k : k + CHUNK]) for k in range(0, max(1, len(i)), CHUNK))
+
+
+def box_gaps(a, b, axes, step, i, j):
+    """Returns lower bounds of distances of nodes on a level, but for what is rounded, from slabs across all axes."""
+    (centre_a, half_a), (centre_b, half_b) = a.tree.levels[min(step, a.tree.depth)], b.tree.levels[min(step, b.tree.depth)]
+    apart = np.abs(axes @ (b.moved(centre_b[j]) - a.moved(centre_a[i])).T)
+    apart -= np.abs(axes @ a.rotation) @ half_a[i].T + np.abs(axes @ b.rotation) @ half_b[j].T
+    # The first three axes are those of the coordinates, so their gaps are the sides of a box.
+    return np.maximum(length(np.maximum(apart[:3], 0.0).T), apart.max(0))
+
+
+def walk(a, b, choose):
+    """Returns the pairs of leaves that are left if `choose` says on each level which pairs of nodes to keep, from their gaps."""
+    x, y, between = np.eye(3), b.rotation.T, b.moved(b.tree.levels[0][0]) - a.moved(a.tree.levels[0][0])
+    # Any direction is valid, so a common normal of two axes that are nearly parallel, which means little, does no harm.
+    axes = unit(np.concatenate([x, y, *(np.cross(x, one) for one in y), between]))
     i, j = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    bound = np.inf if reach is None else reach
     for step in range(max(a.tree.depth, b.tree.depth) + 1):
-        level_a, level_b = min(step, a.tree.depth), min(step, b.tree.depth)
         if 0 < step <= a.tree.depth:
             i, j = split(i, j)
         if 0 < step <= b.tree.depth:
             j, i = split(j, i)
-        (low_a, high_a), (low_b, high_b) = a.levels[level_a], b.levels[level_b]
-        gap = np.maximum(np.maximum(low_a[i] - high_b[j], low_b[j] - high_a[i]), 0.0)
-        gap = length(gap)
-        if reach is None:
-            # Any two points of the meshes bound the distance: here one corner below each node.
-            p = a.triangles[i << a.tree.depth - level_a, 0] - b.triangles[j << b.tree.depth - level_b, 0]
-            bound = min(bound, float(length(p).min()))
-        kept = gap <= bound * (1.0 + SLACK) + 4.0 * error
+        kept = choose(np.concatenate([box_gaps(a, b, axes, step, *some) for some in chunks(i, j)]))
         i, j = i[kept], j[kept]
-    return i, j, bound
+    return i, j
+
+
+def promising_pairs(a, b):
+    """Returns some pairs of leaves that are near each other: those that are below the nearest nodes on all levels."""
+    return walk(a, b, lambda gaps: np.argsort(gaps, kind="stable")[:FIRST])
+
+
+def near_pairs(a, b, reach):
+    """Returns the pairs of leaves whose boxes are at most `reach` apart. The distance of all other pairs is certainly more."""
+    limit = reach * (1.0 + SLACK) + 4.0 * SLAB_ERROR * (a.size + b.size)
+    return walk(a, b, lambda gaps: gaps <= limit)
 
 
 def split(i, j):
@@ -180,10 +212,8 @@ def nearest_points(t, u):
 
 def slabs(t, u, at_t, at_u, size):
     """Returns lower bounds of distances of pairs of triangles: the widths of slabs across given points, less what is rounded."""
-    n = at_u - at_t
-    with np.errstate(divide="ignore", invalid="ignore"):
-        n = np.nan_to_num(n / length(n)[:, None]).clip(-1.0, 1.0)
-    width = dot(u, n[:, None]).min(1) - dot(t, n[:, None]).max(1)
+    n = unit(at_u - at_t)
+    width = reduce(np.minimum, (dot(u[:, k], n) for k in range(3))) - reduce(np.maximum, (dot(t[:, k], n) for k in range(3)))
     # The direction is about 1 long: divided by a little more, the width is a lower bound.
     return np.where(width > 0.0, width / (1.0 + 2.0**-48), width) - SLAB_ERROR * size
 
@@ -200,60 +230,81 @@ def exact_distance(a, b, i, j):
     return (0.0, 0.0) if truth.triangles_meet(t, u) else root_bounds(Fraction(*truth.triangles_apart(t, u)) / 4**bits)
 
 
-def ranked(a, b, reach=None):
-    """Returns near pairs of leaves, lower bounds of their distances by the slab between their centres, and what bounds the others."""
-    i, j, bound = near_pairs(a, b, reach)
-    t, u = a.triangles[i], b.triangles[j]
-    lowers = slabs(t, u, t.sum(1) / 3.0, u.sum(1) / 3.0, a.size + b.size)
+def ranked(a, b, reach):
+    """Returns near pairs of leaves and lower bounds of their distances, by the slab between their centres, the least first."""
+    i, j = near_pairs(a, b, reach)
+    lowers = np.concatenate([centre_slabs(a, b, *some) for some in chunks(i, j)])
     order = np.argsort(lowers, kind="stable")
-    return i[order], j[order], lowers[order], bound
+    return i[order], j[order], lowers[order]
+
+
+def centre_slabs(a, b, i, j):
+    t, u = a.triangles(i), b.triangles(j)
+    return slabs(t, u, t.sum(1) / 3.0, u.sum(1) / 3.0, a.size + b.size)
+
+
+def nearest_pair(a, b, i, j):
+    """Returns the number of the pair that seems nearest, its distance in floats, 0 if it seems to touch, and the direction there."""
+    distances, at_a, at_b, crosses = nearest_points(a.triangles(i), b.triangles(j))
+    k = int(np.argmin(np.where(crosses, 0.0, distances)))
+    return k, 0.0 if crosses[k] else float(distances[k]), (at_b[k] - at_a[k]) / max(distances[k], sys.float_info.min)
 
 
 def float_gap(a, b):
     """Returns the distance in floats, 0 if the meshes seem to touch, and the direction from A to B there. Proves nothing."""
-    i, j, lowers, _ = ranked(a, b)
-    begin, count, least, normal = 0, FIRST, np.inf, None
-    while begin < len(i) and lowers[begin] < least:
+    _, least, normal = nearest_pair(a, b, *promising_pairs(a, b))
+    i, j, lowers = ranked(a, b, least)
+    begin, count = 0, FIRST
+    while least > 0.0 and begin < len(i) and lowers[begin] < least:
         now = slice(begin, begin + count)
-        distances, at_a, at_b, crosses = nearest_points(a.triangles[i[now]], b.triangles[j[now]])
-        if crosses.any():
-            return 0.0, None
-        k = int(np.argmin(distances))
-        if distances[k] < least:
-            least, normal = float(distances[k]), (at_b[k] - at_a[k]) / max(distances[k], sys.float_info.min)
-        begin, count = begin + count, 4 * count
+        _, found, direction = nearest_pair(a, b, i[now], j[now])
+        if found < least:
+            least, normal = found, direction
+        begin, count = begin + count, min(4 * count, CHUNK)
     return least, normal
 
 
 def bounds(a, b):
     """Returns two floats between which the exact distance of two placed meshes certainly is: 0 and 0 if they touch."""
-    i, j, lowers, bound = ranked(a, b)
-    distances, _, _, crosses = nearest_points(a.triangles[i[:FIRST]], b.triangles[j[:FIRST]])
-    k = int(np.argmin(np.where(crosses, 0.0, distances)))
-    upper = exact_distance(a, b, i[k], j[k])[1]
+    i, j = promising_pairs(a, b)
+    k, _, _ = nearest_pair(a, b, i, j)
+    reach = exact_distance(a, b, i[k], j[k])[1]
+    i, j, lowers = ranked(a, b, reach)
+    k, _, _ = nearest_pair(a, b, i[:FIRST], j[:FIRST])
+    upper = min(reach, exact_distance(a, b, i[k], j[k])[1])
+    # Only pairs that the slab between their centres does not separate as far are looked at again, with a better slab.
+    i, j, lower = i[lowers < upper], j[lowers < upper], upper
+    found, crosses = nearest_slabs(a, b, i, j)
     enough = upper * (1.0 - SLACK) - 2.0 * SLAB_ERROR * (a.size + b.size)
-    # Only pairs that the slab between their centres does not separate well enough are looked at again, with a better slab.
-    left = lowers < enough
-    i, j, lower = i[left], j[left], min(bound, lowers[~left].min(initial=np.inf))
-    _, at_a, at_b, crosses = nearest_points(a.triangles[i], b.triangles[j])
-    lowers = slabs(a.triangles[i], b.triangles[j], at_a, at_b, a.size + b.size)
-    lower = min(lower, lowers[lowers >= enough].min(initial=np.inf))
-    for k in sorted(np.flatnonzero(lowers < enough), key=lambda k: not crosses[k]):
+    for count, k in enumerate(np.lexsort((found, ~crosses))):
+        if not crosses[k] and found[k] >= (upper if count < FIRST else enough):
+            # All that follow are at least as far apart.
+            lower = min(lower, float(found[k]))
+            break
         low, high = exact_distance(a, b, i[k], j[k])
         lower, upper = min(lower, low), min(upper, high)
         if upper == 0.0:
             break
-    return max(0.0, min(float(lower), upper)), upper
+    return max(0.0, min(lower, upper)), upper
+
+
+def nearest_slabs(a, b, i, j):
+    """Returns lower bounds of distances by the slabs between nearest points, and which pairs seem to cross."""
+    found = []
+    for some_i, some_j in chunks(i, j):
+        t, u = a.triangles(some_i), b.triangles(some_j)
+        _, at_a, at_b, crosses = nearest_points(t, u)
+        found.append((slabs(t, u, at_a, at_b, a.size + b.size), crosses))
+    return [np.concatenate(of) for of in zip(*found)]
 
 
 def contacts(a, b):
     """Returns all pairs of triangles that touch, exactly."""
-    i, j, lowers, _ = ranked(a, b, 0.0)
+    i, j, lowers = ranked(a, b, 0.0)
     i, j = i[lowers <= 0.0], j[lowers <= 0.0]
     # A triangle that pads the tree counts once.
     pairs = np.unique(np.stack([a.tree.order[i], b.tree.order[j]], 1), axis=0, return_index=True)[1]
     i, j = i[pairs], j[pairs]
-    _, at_a, at_b, _ = nearest_points(a.triangles[i], b.triangles[j])
-    left = slabs(a.triangles[i], b.triangles[j], at_a, at_b, a.size + b.size) <= 0.0
+    left = nearest_slabs(a, b, i, j)[0] <= 0.0
     meet = [(k, l) for k, l in zip(i[left], j[left]) if truth.triangles_meet(*exact_pair(a, b, k, l)[:2])]
     return [(int(a.tree.order[k]), int(b.tree.order[l])) for k, l in meet]

@@ -50,12 +50,11 @@ class Approach:
 
     def __init__(self, a, b, random):
         self.a, self.b = a.placed(None), b
-        (low, high), (low_b, high_b) = self.a.levels[0], b.placed(None).levels[0]
-        self.size = float(gaps.length(high - low)[0])
+        (middle, half), (middle_b, half_b) = ((centre[0], half[0]) for centre, half in (a.levels[0], b.levels[0]))
+        self.size = 2.0 * float(gaps.length(half))
         self.rotation, self.direction = rotation(*on_sphere(random, 4)), on_sphere(random, 3)
-        middle, middle_b = ((low + high)[0] / 2).tolist(), ((low_b + high_b)[0] / 2).tolist()
-        self.start = [m - sum(r * x for r, x in zip(row, middle_b)) for m, row in zip(middle, self.rotation)]
-        self.reach = self.size + float(gaps.length(high_b - low_b)[0])
+        self.start = [m - sum(r * x for r, x in zip(row, middle_b.tolist())) for m, row in zip(middle.tolist(), self.rotation)]
+        self.reach = self.size + 2.0 * float(gaps.length(half_b))
 
     def pose(self, along):
         return [x for row, s, d in zip(self.rotation, self.start, self.direction) for x in (*row, s + along * d)]
