@@ -174,13 +174,45 @@ def link(path):
     return joined(np.frombuffer(data, record, count, 84)["numbers"][:, 3:].reshape(-1, 3, 3))
 
 
+# The joints of the arm UR3 from its base to its hand: the name of the link, where its frame is in that of the link before, the axis
+# around which it turns, and the tangent of half the angle. An angle includes the quarter turn that some frames have.
+UR3 = (
+    ("base", (0.0, 0.0, 0.0), 2, 0.0),
+    ("shoulder", (0.0, 0.0, 0.1519), 2, 0.25),
+    ("upperarm", (0.0, 0.1198, 0.0), 1, 0.25),
+    ("forearm", (0.0, -0.0925, 0.24365), 1, 0.5),
+    ("wrist1", (0.0, 0.0, 0.21325), 1, 0.375),
+    ("wrist2", (0.0, 0.08505, 0.0), 2, -0.25),
+    ("wrist3", (0.0, 0.0, 0.08535), 1, 0.125),
+)
+
+
+def ur3(name):
+    """A link of the arm UR3 where it is when all joints are turned: its corners are in the frame of the base."""
+    corners, faces = link(f"ur_description/meshes/ur3/collision/{name}.stl")
+    number = [joint[0] for joint in UR3].index(name)
+    for _, offset, axis, tangent in UR3[number::-1]:
+        corners = turned(corners.astype(float), axis, tangent) + offset
+    return corners, faces
+
+
+def turned(points, axis, tangent):
+    """Returns points turned around an axis of the coordinates, by the tangent of half the angle."""
+    cosine, sine = (1.0 - tangent * tangent) / (1.0 + tangent * tangent), 2.0 * tangent / (1.0 + tangent * tangent)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    found = points.copy()
+    found[:, i] = cosine * points[:, i] - sine * points[:, j]
+    found[:, j] = sine * points[:, i] + cosine * points[:, j]
+    return found
+
+
 def scaled(factor, maker, *arguments):
     """Another mesh, made larger or smaller by a power of two."""
     corners, faces = MAKERS[maker](*arguments)
     return corners * np.float32(factor), faces
 
 
-MAKERS = {f.__name__: f for f in (scan, part, shell, link, scaled)}
+MAKERS = {f.__name__: f for f in (scan, part, shell, link, ur3, scaled)}
 
 
 def content(corners, faces):
@@ -222,7 +254,10 @@ def instances(field):
     """Returns the instances of a field: the number of each mesh, and its pose as twelve numbers.
 
     They stand in a cube of `side` cells along each axis, shaken and turned by quarters, so that no placed corner is rounded in f64.
+    Without a side, each mesh is there once, in its own place.
     """
+    if "side" not in field:
+        return list(range(len(field["meshes"]))), [np.eye(3, 4).ravel().tolist()] * len(field["meshes"])
     side, step = field["side"], field["step"]
     cells = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3) - (side - 1) / 2
     random = uniform(field["seed"], len(cells), 5)

@@ -90,6 +90,17 @@ class Gaps(unittest.TestCase):
             self.assertGreater(np.linalg.det(np.array(row).reshape(3, 4)[:, :3]), 0.5)
 
 
+    def test_a_joint_turns_points_and_keeps_lengths(self):
+        points = np.array([[1.0, 2.0, 3.0], [-4.0, 0.5, 0.25]])
+        # The tangent of 45 degrees, so a quarter turn.
+        self.assertTrue(np.array_equal(forms.turned(points, 2, 1.0), [[-2.0, 1.0, 3.0], [-0.5, -4.0, 0.25]]))
+        for axis in range(3):
+            found = forms.turned(points, axis, 0.375)
+            self.assertTrue(np.array_equal(found[:, axis], points[:, axis]))
+            self.assertTrue(np.allclose(forms.length(found), forms.length(points), rtol=1e-15, atol=0.0))
+            self.assertFalse(np.allclose(found, points))
+
+
 class Poses(unittest.TestCase):
     def test_they_are_proved_again_and_a_changed_bound_is_found(self):
         # Every fourth of 20 poses at 8 presets, and one pose at each of them where many triangles are slivers.
