@@ -75,6 +75,14 @@ SLIVERS = {
     "sliver": ("mesh", ([[-(2**20), 0, 0], [2**20, 0, 0], [0, 1, 0]], [[0, 1, 2]]), Fraction(1, 2**14)),
     "sliver-fan": ("mesh", ([[0, 0, 0]] + [[2**20, i, i * i] for i in range(8)], [[0, i, i + 1] for i in range(1, 8)]), Fraction(1, 2**14)),
 }
+# Meshes of several convex parts that do not touch each other.
+GROUPS = {
+    "comb": ("boxes", [[3, 40, 30, x, 0, 0] for x in (-52, -26, 0, 26, 52)]),
+    "posts": ("boxes", [[9, 11, 60, x, y, 0] for x in (-32, 32) for y in (-30, 30)]),
+    "corner": ("boxes", [[4, 60, 60, -64, 4, 4], [56, 4, 60, 0, -64, 4], [56, 56, 4, 0, 0, -64]]),
+    "crowd": ("group", ([[-70, 0, 0], "octahedron", [50, 40, 30]], [[60, 5, -10], "tetrahedron", [45]], [[0, 80, 15], "prism", [[[-40, -30], [60, -30], [-40, 50]], 35]])),
+    "beads": ("group", [[[x, x // 8, -x // 4], "octahedron", [22, 26, 24]] for x in (-96, -48, 0, 48, 96)]),
+}
 BROKEN = {
     "nan-corner": ([["nan", "0x0p+0", "0x0p+0"], ["0x1p+0", "0x0p+0", "0x0p+0"], ["0x0p+0", "0x1p+0", "0x0p+0"]], [[0, 1, 2]]),
     "infinite-corner": ([["0x0p+0", "-inf", "0x0p+0"], ["0x1p+0", "0x0p+0", "0x0p+0"], ["0x0p+0", "0x1p+0", "0x0p+0"]], [[0, 1, 2]]),
@@ -92,7 +100,7 @@ def kept(file):
 def mesh_records():
     """Returns the lines of `meshes.jsonl` by name. Meshes of hard pairs come from no rule, and are kept."""
     records = {}
-    for name, (maker, arguments, *rest) in {**CLOSED, **OTHERS, **DEGENERATE, **SCALED, **SLIVERS}.items():
+    for name, (maker, arguments, *rest) in {**CLOSED, **OTHERS, **DEGENERATE, **SCALED, **SLIVERS, **GROUPS}.items():
         points, triangles = meshes.make(maker, arguments, *rest)
         vertices = [[to_hex(float(x)) for x in p] for p in points]
         assert all(Fraction(float(x)) == x for p in points for x in p), name
@@ -254,6 +262,7 @@ PROOFS = {
     "segment": ["features", "shortest vector"],
     "motion": ["events of corners and edges", "shortest vectors of swept hulls"],
     "penetration": ["overlaps along normals", "hull of differences"],
+    "penetration of parts": ["planes of overlaps of parts", "hulls of differences that cover a ball"],
     "self_contacts": ["features", "shortest vector"],
     "refused": ["by definition", "by definition"],
 }
@@ -276,7 +285,8 @@ def state(case):
     if not items:
         return None
     refused = items[0]["truth"] == "refused"
-    case["proof"] = PROOFS["refused" if refused else case["ask"]]
+    has_parts = case["ask"] == "penetration" and {case["a"], case["b"]} & set(GROUPS)
+    case["proof"] = PROOFS["refused" if refused else "penetration of parts" if has_parts else case["ask"]]
     case["needs"] = needs(case)
     return case
 
@@ -533,6 +543,58 @@ def make_depths(maker):
             maker.add("depths", "penetration", (a, b), [{"pose": p} for p in poses], "convex meshes, apart or overlapping", ("penetration",), 1)
 
 
+def grazing_motion(random, a, b, rotation, normal, depth):
+    """Returns a motion along a plane with this normal, whose first component that is not 0 is 1, which is deeper by `depth` than the one
+    that only touches.
+
+    At half time, the first corners along the normal meet, or are aside of each other, so that edges or faces do.
+    """
+    turned = prove.placed(corners(b), [Fraction(v) for i in range(3) for v in (*rotation[3 * i : 3 * i + 3], 0)])
+    top = max(corners(a), key=lambda p: truth.dot(normal, p))
+    bottom = min(turned, key=lambda p: truth.dot(normal, p))
+    while (way := truth.cross(normal, direction(random))) == truth.ZERO:
+        pass
+    aside = random.pick((truth.ZERO, truth.cross(normal, direction(random))))
+    lift = [-depth if i == next(i for i in range(3) if normal[i]) else 0 for i in range(3)]
+    steps = int(reach(a) + reach(b)) // max(map(abs, way)) + 1
+    middle = [x - y + s + d for x, y, s, d in zip(top, bottom, aside, lift)]
+    return {key: pose_of(rotation, [m + sign * steps * w for m, w in zip(middle, way)]) for key, sign in (("start", -1), ("end", 1))}
+
+
+def make_grazing(maker):
+    random = meshes.Random(800)
+    names = ["box", "tetrahedron", "octahedron", "wedge", "ell", "ring", "ball-32"]
+    normals = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, -1), (1, 1, 1), (1, -1, 1)]
+    little, tiny = Fraction(1, 2**12), Fraction(1, 2**28)
+    for i, a in enumerate(names):
+        for b in names[i:]:
+            rotation = random.pick(QUARTER_TURNS)
+            chosen = [random.pick(normals) for _ in range(4)]
+            for depths, reason in (((0,), "motions that touch and never go in"), ((-little, tiny), "motions that miss by 2^-12, or go in by 2^-28")):
+                items = [grazing_motion(random, a, b, rotation, n, depth) for n in chosen for depth in depths]
+                maker.add("motions", "motion", (a, b), items, reason, ("motion", "grazing"), 2)
+    for b, half in (("box", (60, 40, 30)), ("grain", (3, 3, 3))):
+        # Through the hole of the ring, along a wall or two of it, which are 50 from the middle.
+        items = []
+        for turn in (IDENTITY, (0, 1, 0, 0, 0, 1, 1, 0, 0)):
+            x, y, z = (sum(abs(turn[3 * i + j]) * half[j] for j in range(3)) for i in range(3))
+            if x <= 50 and y <= 50:
+                for room in (0, little, -tiny):
+                    for at in ((50 - x - room, 0), (0, y - 50 + room), (50 - x - room, y - 50 + room)):
+                        items.append({key: pose_of(turn, (*at, h * (z + 30))) for key, h in (("start", -1), ("end", 1))})
+        maker.add("motions", "motion", ("ring", b), items, "motions through a hole, along its walls, 2^-12 beside them or 2^-28 into them", ("motion", "grazing"), 2)
+
+
+def make_depths_of_parts(maker):
+    random = meshes.Random(900)
+    for a in GROUPS:
+        for b in ("box", "octahedron", "wedge", "bar", "two-boxes", "tetrahedron"):
+            spread = int(reach(a)) * 3 // 4
+            poses = [pose_of(random.pick(QUARTER_TURNS), [random.between(-spread, spread) for _ in range(3)]) for _ in range(4)]
+            reason = "meshes of several convex parts: what frees B from one part may move it into another"
+            maker.add("depths", "penetration", (a, b), [{"pose": p} for p in poses], reason, ("penetration", "concave"), 2)
+
+
 def make_self_contacts(maker):
     for name in (*CLOSED, *OTHERS):
         if name != "soup-200" and name != "ball-512":
@@ -545,7 +607,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     jobs = parser.parse_args().jobs
     maker = Maker()
-    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_self_contacts):
+    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_grazing, make_depths_of_parts, make_self_contacts):
         make(maker)
     CASES.mkdir(exist_ok=True)
     cases = [case for of in maker.cases.values() for case in of]

@@ -57,6 +57,12 @@ def boxes(*of):
     return together(*(box(*one) for one in of))
 
 
+def group(*of):
+    """Other meshes, each moved by a shift, as one mesh: (shift, maker, arguments) of each."""
+    made = ((shift, *MAKERS[maker](*arguments)) for shift, maker, arguments in of)
+    return together(*(([tuple(x + s for x, s in zip(p, shift)) for p in points], faces) for shift, points, faces in made))
+
+
 def tetrahedron(r):
     return [(r, r, r), (r, -r, -r), (-r, r, -r), (-r, -r, r)], [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]
 
@@ -171,7 +177,7 @@ def twice(maker, *arguments):
     return corners, faces + faces
 
 
-MAKERS = {f.__name__: f for f in (box, boxes, tetrahedron, octahedron, prism, ell, ring, ball, terrain, soup, mesh, turned_over, without, twice)}
+MAKERS = {f.__name__: f for f in (box, boxes, group, tetrahedron, octahedron, prism, ell, ring, ball, terrain, soup, mesh, turned_over, without, twice)}
 
 
 def make(maker, arguments, scale=1, shift=(0, 0, 0)):

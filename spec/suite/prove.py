@@ -105,7 +105,8 @@ def first(case, meshes, item):
     if ask == "relation":
         return truth.relation(a, b)
     if ask == "penetration":
-        return stated_root(truth.depth(a, b) / unit**2)
+        square = truth.depth_of_parts(a, b)[0] if has_parts(a, b) else truth.depth(a, b)
+        return stated_root(square / unit**2)
     square = truth.squared_distance(a, b)
     if ask == "collide":
         return square == 0
@@ -113,6 +114,10 @@ def first(case, meshes, item):
         raise ValueError("the distance of an empty mesh")
     square = Fraction(square) / unit**2
     return stated_root(square) if ask == "distance" else square <= exact.fraction(item["within"]) ** 2
+
+
+def has_parts(a, b):
+    return any(len(truth.components(of)) > 1 for of in (a, b))
 
 
 def about_probe(ask, case, meshes, item):
@@ -166,6 +171,10 @@ def confirmed(case, meshes, item, stated_truth):
     if ask == "relation":
         return second.relation(a, b) == stated_truth
     if ask == "penetration":
+        if has_parts(a, b):
+            # The first way only suggests where to move.
+            square, exit = truth.depth_of_parts(a, b)
+            return second.depth_is(a, b, square, exit) and holds(stated_truth, square / unit**2)
         return holds(stated_truth, second.depth(a, b) / unit**2)
     square = second.squared_distance(a, b)
     if ask == "collide":

@@ -233,6 +233,35 @@ def depth(a, b):
     return min(Fraction(h * h, dot(n, n)) for n, h in heights.items())
 
 
+def depth_is(a, b, square, exit):
+    """Proves the depth of two meshes whose connected parts are convex, with a translation of that length as a point and a denominator.
+
+    After that translation no parts overlap. After each translation that is shorter by 2^-20 or more, some do: the ball of these is cut into
+    cubes until each is beyond the ball or inside the hull of differences of two parts. Planes that the ball does not reach are left out.
+    """
+    hulls = []
+    for x in corners_of_parts(a):
+        for y in corners_of_parts(b):
+            v = min(y)
+            planes = difference_hull((tuple(sorted(x)),), (tuple(sorted(sub(p, v) for p in y)),))
+            hulls.append([(n, h - dot(n, v)) for n, h in planes.items()])
+    point, size = exit
+    if Fraction(dot(point, point), size * size) != square or any(all(dot(n, point) < h * size for n, h in planes) for planes in hulls):
+        return False
+    limit = int(square * (2**20 - 1) ** 2 * 4**4)
+    scaled = [[(n, sum(max(0, x) for x in n), h << 24) for n, h in planes if h < 0 or h * h < square * dot(n, n)] for planes in hulls]
+
+    def is_covered(low, side):
+        gaps = [max(x, -x - side, 0) for x in low]
+        if dot(gaps, gaps) > limit or any(all(dot(n, low) + side * reach < h for n, reach, h in planes) for planes in scaled):
+            return True
+        half = side // 2
+        return side > 1 and all(is_covered((low[0] + i, low[1] + j, low[2] + k), half) for i in (0, half) for j in (0, half) for k in (0, half))
+
+    side = 2 ** (limit.bit_length() // 2 + 1)
+    return square == 0 or is_covered((-side, -side, -side), 2 * side)
+
+
 def meet_wrongly(t, u):
     """Tells whether triangles of one mesh meet in more than their common corners, from distances of the parts beyond them."""
     common = set(t) & set(u)

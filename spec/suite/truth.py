@@ -5,6 +5,7 @@ collinear corners they are segments, with equal corners they are points. Touchin
 """
 
 from fractions import Fraction
+from itertools import combinations
 from math import gcd
 
 
@@ -370,6 +371,73 @@ def depth(a, b):
             square = Fraction(overlap * overlap, dot(n, n))
             best = square if best is None else min(best, square)
     return best
+
+
+def projected(planes):
+    """Returns the projection of the origin onto the plane, line or point in all planes n . x = h, with a common denominator, or None."""
+    if len(planes) == 1:
+        ((n, h),) = planes
+        return tuple(h * x for x in n), dot(n, n)
+    if len(planes) == 2:
+        (n, h), (m, k) = planes
+        nn, mm, nm = dot(n, n), dot(m, m), dot(n, m)
+        along_n, along_m, size = h * mm - k * nm, k * nn - h * nm, nn * mm - nm * nm
+        return (tuple(along_n * x + along_m * y for x, y in zip(n, m)), size) if size else None
+    (l, g), (m, h), (n, k) = planes
+    found = tuple(g * x + h * y + k * z for x, y, z in zip(cross(m, n), cross(n, l), cross(l, m)))
+    size = dot(l, cross(m, n))
+    return (found, size) if size > 0 else (tuple(-x for x in found), -size) if size else None
+
+
+def overlap_planes(a, b):
+    """Returns planes (n, h): two convex polytopes overlap if b is moved by t, where n . t < h for all of them."""
+    if not all(dot(normal(t), sub(p, t[0])) <= 0 for part in (a, b) for t in part for u in part for p in u):
+        raise ValueError("expected parts that are convex")
+    edges_a, edges_b = ({primitive(sub(t[j], t[i])) for t in of for i, j in EDGES} for of in (a, b))
+    normals = {primitive(n) for n in (*map(normal, a), *map(normal, b), *(cross(d, e) for d in edges_a for e in edges_b))} - {ZERO}
+    planes = []
+    for n in (m for x, y, z in normals for m in ((x, y, z), (-x, -y, -z))):
+        planes.append((n, max(dot(n, p) for t in a for p in t) - min(dot(n, p) for t in b for p in t)))
+    return planes
+
+
+def depth_of_parts(a, b):
+    """Returns the squared depth of two meshes whose connected parts are convex, and a translation of that length as a point and a denominator.
+
+    Translations after which two parts overlap are the inside of a polytope. Consider the nearest one that is inside none. Along the planes
+    of all polytopes that it is on, nothing changes around it, so it is the projection of the origin onto these: onto one plane, the line
+    of two or the point of three.
+    """
+    solids = [overlap_planes(x, y) for x in components(a) for y in components(b)]
+
+    def is_free(point, size):
+        return not any(all(dot(n, point) < h * size for n, h in planes) for planes in solids)
+
+    if is_free(ZERO, 1):
+        return Fraction(0), (ZERO, 1)
+    best, exit = None, None
+
+    def look_at(planes):
+        """Tells whether the projection onto planes is nearer than what is known, and keeps it if it is free."""
+        nonlocal best, exit
+        found = projected(planes)
+        if found is None:
+            return False
+        square = Fraction(dot(found[0], found[0]), found[1] ** 2)
+        if best is not None and square >= best:
+            return False
+        if is_free(*found):
+            best, exit = square, found
+        return True
+
+    planes = sorted({plane for solid in solids for plane in solid}, key=lambda plane: Fraction(plane[1] ** 2, dot(plane[0], plane[0])))
+    near = [plane for plane in planes if look_at([plane])]
+    lines = {(i, j) for i, j in combinations(range(len(near)), 2) if look_at([near[i], near[j]])}
+    for i, j in sorted(lines):
+        for k in range(j + 1, len(near)):
+            if (i, k) in lines and (j, k) in lines:
+                look_at([near[i], near[j], near[k]])
+    return best, exit
 
 
 def primitive(v):

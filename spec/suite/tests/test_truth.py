@@ -116,6 +116,26 @@ class BothWays(unittest.TestCase):
                 there = [truth.moved(t, v) for t in b]
                 self.assertEqual(truth.depth(a, there), second.depth(a, there), v)
 
+    def test_depths_of_parts(self):
+        for v in (self.points(1, 4)[0] for _ in range(3)):
+            a, b = triangles_of("octahedron", 3, 4, 5), [truth.moved(t, v) for t in triangles_of("box", 1, 9, 9)]
+            square, exit = truth.depth_of_parts(a, b)
+            self.assertEqual(square, truth.depth(a, b), v)
+            self.assertTrue(second.depth_is(a, b, square, exit), v)
+        # Two blocks with a gap of 1, which is too narrow for the plug: the way out is up. Two plates with a gap of 2, in which it fits exactly.
+        blocks, plates = ("boxes", [2, 2, 2, 0, 0, 0], [2, 2, 2, 5, 0, 0]), ("boxes", [2, 9, 9, 0, 0, 0], [2, 9, 9, 6, 0, 0])
+        known = ((blocks, (2, 0, 1), 2), (blocks, (1, 0, 0), 3), (blocks, (2, 1, 0), 2), (plates, (1, 0, 0), 2), (plates, (2, 1, 0), 1), (plates, (3, 0, 0), 0))
+        for mesh, v, expected in known:
+            a, b = triangles_of(*mesh), [truth.moved(t, v) for t in triangles_of("box", 1, 1, 1)]
+            square, exit = truth.depth_of_parts(a, b)
+            self.assertEqual(square, expected**2, (mesh, v))
+            self.assertTrue(second.depth_is(a, b, square, exit), (mesh, v))
+            if expected:
+                # A shorter way that is not free, and a longer one: the ball that reaches there is not covered.
+                for factor in (1, 4):
+                    other = tuple(factor * x for x in exit[0]), 2 * exit[1]
+                    self.assertFalse(second.depth_is(a, b, square * Fraction(factor, 2) ** 2, other), (mesh, v, factor))
+
     def test_self_contacts(self):
         found = 0
         for _ in range(60):
