@@ -31,18 +31,11 @@ SCALING = ("scan-1k", "scan-10k", "scan-100k")
 class Cell:
     """What one library needed for one question at one preset of a pair."""
 
-    def __init__(self):
-        self.rounds, self.wrong = {}, set()
-
-    def add(self, record):
-        self.rounds[record["round"]] = record["nanoseconds"]
-        self.wrong.update(record["wrong"])
-
-    def finish(self):
+    def __init__(self, rounds, wrong):
         # The first round is cold, unless it is the only one.
-        steady = [times for number, times in self.rounds.items() if number] or list(self.rounds.values())
+        steady, self.wrong = rounds[1:] or rounds, wrong
         count = max(map(len, steady))
-        self.poses, self.cold = count, median(self.rounds[min(self.rounds)])
+        self.poses, self.cold = count, median(rounds[0])
         self.median = median(median(times[k] for times in steady if k < len(times)) for k in range(count))
         ordered = sorted(x for times in steady for x in times)
         self.p99 = ordered[min(len(ordered), ceil(0.99 * len(ordered))) - 1]
@@ -53,9 +46,8 @@ def read(folder):
     head, builds, batches, failed, cells = None, [], [], [], {}
     for line in (folder / "times.jsonl").read_text(encoding="utf-8").splitlines():
         record = json.loads(line)
-        if "round" in record:
-            row = cells.setdefault((record["ask"], record["pair"], record["preset"]), {})
-            row.setdefault(record["runner"], Cell()).add(record)
+        if "ask" in record:
+            cells.setdefault((record["ask"], record["pair"], record["preset"]), {})[record["runner"]] = Cell(record["rounds"], record["wrong"])
         elif "batch" in record:
             batches.append(record)
         elif "failed" in record:
@@ -64,9 +56,6 @@ def read(folder):
             builds.append(record)
         else:
             head = record
-    for row in cells.values():
-        for cell in row.values():
-            cell.finish()
     return head, builds, batches, failed, cells
 
 

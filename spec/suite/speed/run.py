@@ -119,9 +119,10 @@ class Measurement:
     def __init__(self, arguments, runners, output):
         self.arguments, self.runners, self.output = arguments, runners, output
         self.wrong, self.asked, self.failed = 0, 0, 0
+        self.cells = {}
 
     def write(self, record):
-        self.output.write(json.dumps(record) + "\n")
+        self.output.write(json.dumps(record, separators=(",", ":")) + "\n")
         self.output.flush()
 
     def pair(self, name, folder):
@@ -145,10 +146,13 @@ class Measurement:
                     first = number % max(1, len(ready))
                     for runner in ready[first:] + ready[:first]:
                         if what in runner.profile["timed"]:
-                            if not self.attempt(runner, name, self.round, runner, name, number, what, preset, a, b, items[preset], size[preset]):
+                            if not self.attempt(runner, name, self.round, runner, name, what, preset, a, b, items[preset], size[preset]):
                                 ready.remove(runner)
         for runner in ready:
             runner.stop()
+        for cell in self.cells.values():
+            self.write(cell)
+        self.cells.clear()
 
     def attempt(self, runner, name, what, *arguments):
         """Does something with a runner, and returns whether it works. One that fails is out for this pair."""
@@ -186,14 +190,17 @@ class Measurement:
             runner.stop()
         return runner.profile
 
-    def round(self, runner, name, number, what, preset, a, b, items, size):
+    def round(self, runner, name, what, preset, a, b, items, size):
+        """Asks one runner one question about all poses of a preset. A cell has the times of all rounds, and the answers of the first."""
         answer = runner.ask(what, a, b, items, self.arguments.budget)
         if answer is None:
             return True
         wrong = [k for k, (found, (_, fact)) in enumerate(zip(answer["answers"], items)) if not is_right(what, found, fact, size, runner.profile)]
         self.wrong, self.asked = self.wrong + len(wrong), self.asked + len(answer["answers"])
-        record = {"runner": runner.name, "pair": name, "round": number, "ask": what, "preset": preset, "nanoseconds": answer["nanoseconds"], "wrong": wrong}
-        self.write(record | ({"answers": answer["answers"]} if number == 0 or wrong else {}))
+        cell = {"runner": runner.name, "pair": name, "ask": what, "preset": preset, "rounds": [], "wrong": [], "answers": answer["answers"]}
+        cell = self.cells.setdefault((runner.name, what, preset), cell)
+        cell["rounds"].append(answer["nanoseconds"])
+        cell["wrong"] = sorted({*cell["wrong"], *wrong})
         return True
 
     def batches(self, name, folder):

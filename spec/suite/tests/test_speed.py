@@ -163,10 +163,9 @@ class Reports(unittest.TestCase):
         costs = lambda seconds: {"meshes": {"m": {"seconds": seconds, "open_seconds": None, "bytes": 1000}}, "first_nanoseconds": 5000, "triangles": {"m": 10}}
         lines = [head, {"runner": "cbvh", "pair": "p", **costs(0.2)}, {"runner": "x", "pair": "p", **costs(0.1)}]
         for name, nanoseconds, wrong in (("cbvh", 2000, []), ("x", 1000, []), ("y", 10, [1])):
-            for number in range(3):
-                # The first round is cold and does not count.
-                times = [nanoseconds * (100 if number == 0 else 1)] * 2
-                lines.append({"runner": name, "pair": "p", "round": number, "ask": "collide", "preset": "1%", "nanoseconds": times, "wrong": wrong})
+            # The first round is cold and does not count.
+            rounds = [[nanoseconds * factor] * 2 for factor in (100, 1, 1)]
+            lines.append({"runner": name, "pair": "p", "ask": "collide", "preset": "1%", "rounds": rounds, "wrong": wrong})
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "times.jsonl").write_text("\n".join(map(json.dumps, lines)), encoding="utf-8")
             report.main([folder])
