@@ -102,6 +102,14 @@ impl<L> Tree<L> {
         self.nodes.len().div_ceil(2)
     }
 
+    /// Returns all leaves, in the order in which the tree was built.
+    pub(super) fn leaves_mut(&mut self) -> impl Iterator<Item = &mut L> {
+        self.nodes.iter_mut().filter_map(|node| match &mut node.content {
+            Content::Leaf(leaf) => Some(leaf),
+            Content::Inner(_) => None,
+        })
+    }
+
     pub(super) fn at(&self, index: NodeIndex) -> &TreeNode<L> {
         &self.nodes[index as usize]
     }

@@ -229,16 +229,23 @@ impl Builder {
         Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, reinsert }
     }
 
-    /// Takes the triangles of a brick out of their storage and builds their tree.
+    /// Takes the triangles of a brick out of their storage, builds their tree, and puts them in the order of its packets.
     fn tree_of_brick(
         &self,
         brick: Stream<Triangle>,
         trees: &Tally,
     ) -> Result<(Tree<PacketTriangles>, Vec<Triangle>), BakeError> {
         let triangles = brick.take()?;
-        let tree = self.tree(&triangles);
+        let mut tree = self.tree(&triangles);
+        // All later steps go from packet to packet, and would otherwise wait for far memory at each triangle.
+        let mut in_order = Vec::with_capacity(triangles.len());
+        for packet in tree.leaves_mut() {
+            let first = in_order.len() as u32;
+            in_order.extend(packet.numbers().iter().map(|&number| triangles[number as usize]));
+            *packet = PacketTriangles::new(first..in_order.len() as u32);
+        }
         trees.add(triangles.len() as u64);
-        Ok((tree, triangles))
+        Ok((tree, in_order))
     }
 
     /// Builds the tree of a brick.
