@@ -28,9 +28,9 @@ pub struct Bound<'a> {
     /// The turning slab that a query decodes, if the child has one.
     pub turning: Option<TurningSlab>,
     /// The tightest bound of the triangles below.
-    pub tight: Kdop,
+    pub tight: &'a Kdop,
     /// The anchor of the subtree root that the child leads to; for other children [`Kdop::EMPTY`].
-    pub anchor: Kdop,
+    pub anchor: &'a Kdop,
     /// The triangles of a leaf packet, and those below a child in a profile with turning slabs, unless there are more than
     /// [`MAX_TRIANGLES`].
     pub patch: Option<&'a [Packet]>,
@@ -170,11 +170,11 @@ pub fn visit_bounds<'b>(
     let patches = profile.has_turning_slabs().then(|| Patches::of_page(page, &packets, &below));
     for root in 0..header.roots {
         let decoded = page.anchor_slabs(root).to_kdop(slabs);
-        let (tight, anchor) = (tight[usize::from(root)], Kdop::EMPTY);
+        let (tight, anchor) = (&tight[usize::from(root)], &Kdop::EMPTY);
         visit(Bound { slot: root, child: None, decoded, turning: None, tight, anchor, patch: None })?;
     }
     decode_page(page, object.f16_scale, |slot, child, _, node| {
-        let (mut anchor, link) = (Kdop::EMPTY, page.links(slot).child(child));
+        let (mut anchor, link) = (&Kdop::EMPTY, page.links(slot).child(child));
         let patch = match (&patches, link) {
             (_, Child::Leaf { packet, .. }) => packets.get(usize::from(packet)..=usize::from(packet)),
             (Some(patches), Child::Treelet(slot)) => patches.of_slot(usize::from(slot)),
@@ -184,14 +184,14 @@ pub fn visit_bounds<'b>(
             _ => None,
         };
         if let Child::Remote(link) = link {
-            anchor = below(page.remote(link)).anchor;
+            anchor = &below(page.remote(link)).anchor;
         }
         visit(Bound {
             slot,
             child: Some(child),
             decoded: node.to_kdop(slabs),
             turning: decode_turning(profile, page.treelet(slot), child, node),
-            tight: children[usize::from(slot) * width + child],
+            tight: &children[usize::from(slot) * width + child],
             anchor,
             patch,
         })
@@ -228,10 +228,10 @@ pub fn check_bounds<'b>(
         let Bound { slot, child, decoded, turning, tight, anchor, patch } = bound;
         let place =
             || child.map_or_else(|| format!("slot {slot}"), |child| format!("slot {slot}, child {child}"));
-        ensure(decoded.contains(&tight, slabs), Rule::BoundContains, at, || {
+        ensure(decoded.contains(tight, slabs), Rule::BoundContains, at, || {
             (format!("{} to contain {tight:?}", place()), format!("{decoded:?}"))
         })?;
-        ensure(decoded.contains(&anchor, slabs), Rule::Nested, at, || {
+        ensure(decoded.contains(anchor, slabs), Rule::Nested, at, || {
             (format!("{} to contain the anchor it leads to, {anchor:?}", place()), format!("{decoded:?}"))
         })?;
         if let (Some(child), Some(packets)) = (child, patch)
@@ -251,7 +251,7 @@ pub fn check_bounds<'b>(
             })?;
         }
         if child.is_some() {
-            inflation.add(&decoded, &tight, slabs);
+            inflation.add(&decoded, tight, slabs);
         }
         Ok(())
     })?;

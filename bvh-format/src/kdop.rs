@@ -164,7 +164,10 @@ impl Kdop {
 
     /// Returns true if the first `slabs` slabs contain those of `inner`.
     pub fn contains(&self, inner: &Self, slabs: usize) -> bool {
-        (0..slabs).all(|slab| self.lo[slab] <= inner.lo[slab] && self.hi[slab] >= inner.hi[slab])
+        // Without a branch compilers compare several ends at once.
+        (0..slabs).fold(true, |all, slab| {
+            all & (self.lo[slab] <= inner.lo[slab]) & (self.hi[slab] >= inner.hi[slab])
+        })
     }
 }
 

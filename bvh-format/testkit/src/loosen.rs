@@ -87,8 +87,8 @@ pub fn rewritten(
         let mut roots = Vec::new();
         visit_bounds(object, &page, leaf_block, subtree, |bound: Bound| {
             match bound.child {
-                None => roots.push(bound.tight),
-                Some(child) => _ = children.insert((bound.slot, child), (bound.tight, bound.turning)),
+                None => roots.push(*bound.tight),
+                Some(child) => _ = children.insert((bound.slot, child), (*bound.tight, bound.turning)),
             }
             Ok(())
         })
