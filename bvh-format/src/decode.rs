@@ -6,7 +6,7 @@ use crate::page::Page;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, residual_unit};
 use crate::slabs::{NodeSlabs, row};
-use crate::treelet::{Child, read_codes, read_ends};
+use crate::treelet::{Child, CodePlaces};
 
 /// Decodes the slabs of one child of a treelet. `parent` holds the decoded slabs of the treelet itself.
 pub fn decode_child(
@@ -29,16 +29,17 @@ pub(crate) fn decode_slabs(
     slabs: usize,
 ) -> NodeSlabs {
     let encoding = profile.encoding();
+    let places = CodePlaces::new(profile, treelet, child);
     let mut node = NodeSlabs::default();
     for slab in 0..slabs {
         let row = row(slab);
         if encoding == Encoding::F32 {
-            (node.lo[row], node.hi[row]) = read_ends(profile, treelet, child, slab);
+            (node.lo[row], node.hi[row]) = places.read_ends(treelet, slab);
             continue;
         }
         let (parent_lo, parent_hi) = (parent.lo[row], parent.hi[row]);
         let unit = residual_unit(encoding, parent_lo, parent_hi, object_scale);
-        let (code_lo, code_hi) = read_codes(profile, treelet, child, slab);
+        let (code_lo, code_hi) = places.read(treelet, slab);
         node.lo[row] = decode_min(encoding, code_lo, parent_lo, unit);
         node.hi[row] = decode_max(encoding, code_hi, parent_hi, unit);
     }

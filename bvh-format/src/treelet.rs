@@ -216,75 +216,100 @@ pub(crate) fn is_short(treelet: &[u8]) -> bool {
     treelet.len() == SHORT_TREELET_BYTES
 }
 
-/// Returns where both codes of a child stand in a short treelet.
-fn short_place(profile: Profile, child: usize, slab: usize) -> usize {
-    debug_assert!(profile.has_short_treelets() && slab < 7);
-    let half = if profile.width() == 8 { SHORT_TREELET_BYTES / 2 } else { 0 };
-    (child / 4) * half + row(slab) * 4 + child % 4
+/// Where the codes of one child stand in a treelet.
+pub(crate) struct CodePlaces {
+    encoding: Encoding,
+    is_short: bool,
+    /// The byte of row 0, and the bytes from each row to the next.
+    first: usize,
+    per_row: usize,
+    /// The bytes from the code of a lower end to that of the upper end. If it is 0, one byte has both, that of the lower end
+    /// in the low nibble.
+    upper: usize,
 }
 
-/// Where the two codes of a child's slab stand in a treelet, in bytes.
-struct CodePlace {
-    lo: usize,
-    hi: usize,
-}
+impl CodePlaces {
+    /// Returns the places of child `child` in a treelet of these bytes.
+    #[inline]
+    pub(crate) fn new(profile: Profile, treelet: &[u8], child: usize) -> Self {
+        let (encoding, width, is_short) = (profile.encoding(), profile.width(), is_short(treelet));
+        debug_assert!(!is_short || profile.has_short_treelets());
+        let half = if is_short { SHORT_TREELET_BYTES } else { profile.treelet_bytes() } / 2;
+        let size = match encoding {
+            Encoding::U4 | Encoding::U8 => 1,
+            Encoding::F16 => 2,
+            Encoding::F32 => 4,
+        };
+        // At width 8, each half has four of the children.
+        let (first, columns, upper) = match width {
+            8 => ((child / 4) * half + child % 4, 4, half / 2),
+            _ => (child * size, width * size, half),
+        };
+        let in_one_byte = is_short || encoding == Encoding::U4;
+        Self { encoding, is_short, first, per_row: columns, upper: if in_one_byte { 0 } else { upper } }
+    }
 
-/// Returns where the codes of a child stand in a treelet that is not short. U4 keeps both in one byte, that of the lower end in the low nibble.
-fn place(profile: Profile, child: usize, slab: usize) -> CodePlace {
-    let half = profile.treelet_bytes() / 2;
-    let row = row(slab);
-    match (profile.encoding(), profile.width()) {
-        (Encoding::U4, 8) => {
-            let at = (child / 4) * half + row * 4 + child % 4;
-            CodePlace { lo: at, hi: at }
-        }
-        (Encoding::U4, _) => CodePlace { lo: row * 4 + child, hi: row * 4 + child },
-        (_, 8) => {
-            let at = (child / 4) * half + row * 4 + child % 4;
-            CodePlace { lo: at, hi: at + half / 2 }
-        }
-        (encoding, width) => {
-            let size = match encoding {
-                Encoding::F16 => 2,
-                Encoding::F32 => 4,
-                _ => 1,
-            };
-            let at = (row * width + child) * size;
-            CodePlace { lo: at, hi: at + half }
-        }
+    /// Returns the bytes at which the codes of a slab start.
+    #[inline]
+    fn of(&self, slab: usize) -> (usize, usize) {
+        let lo = self.first + row(slab) * self.per_row;
+        (lo, lo + self.upper)
     }
-}
 
-/// Reads the two codes of a child's slab. For F32, which has no codes, it returns 0: see `read_ends`.
-pub(crate) fn read_codes(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> (u16, u16) {
-    if is_short(treelet) {
-        let both = usize::from(treelet[short_place(profile, child, slab)]);
-        return (SHORT_CODES[both & 15].into(), SHORT_CODES[both >> 4].into());
-    }
-    let CodePlace { lo, hi } = place(profile, child, slab);
-    match profile.encoding() {
-        Encoding::U4 => (u16::from(treelet[lo] & 15), u16::from(treelet[lo] >> 4)),
-        Encoding::U8 => (u16::from(treelet[lo]), u16::from(treelet[hi])),
-        Encoding::F16 => {
-            let code = |at: usize| u16::from_le_bytes([treelet[at], treelet[at + 1]]);
-            (code(lo), code(hi))
+    /// Reads the two codes of a slab. For F32, which has no codes, it returns 0: see `read_ends`.
+    #[inline]
+    pub(crate) fn read(&self, treelet: &[u8], slab: usize) -> (u16, u16) {
+        let (lo, hi) = self.of(slab);
+        if self.upper == 0 {
+            let (lo, hi) = (treelet[lo] & 15, treelet[lo] >> 4);
+            let code = |code: u8| if self.is_short { SHORT_CODES[usize::from(code)] } else { code };
+            return (code(lo).into(), code(hi).into());
         }
-        Encoding::F32 => (0, 0),
+        match self.encoding {
+            Encoding::U4 | Encoding::U8 => (u16::from(treelet[lo]), u16::from(treelet[hi])),
+            Encoding::F16 => {
+                let code = |at: usize| u16::from_le_bytes([treelet[at], treelet[at + 1]]);
+                (code(lo), code(hi))
+            }
+            Encoding::F32 => (0, 0),
+        }
     }
-}
 
-/// Reads the two ends of a child's slab from a treelet of encoding F32. For other encodings it returns 0.
-pub(crate) fn read_ends(profile: Profile, treelet: &[u8], child: usize, slab: usize) -> (f32, f32) {
-    if profile.encoding() != Encoding::F32 {
-        return (0.0, 0.0);
+    /// Reads the two ends of a slab from a treelet of encoding F32. For other encodings it returns 0.
+    pub(crate) fn read_ends(&self, treelet: &[u8], slab: usize) -> (f32, f32) {
+        if self.encoding != Encoding::F32 {
+            return (0.0, 0.0);
+        }
+        let (lo, hi) = self.of(slab);
+        let end = |at: usize| {
+            let mut bytes = [0; 4];
+            bytes.copy_from_slice(&treelet[at..at + 4]);
+            f32::from_le_bytes(bytes)
+        };
+        (end(lo), end(hi))
     }
-    let CodePlace { lo, hi } = place(profile, child, slab);
-    let end = |at: usize| {
-        let mut bytes = [0; 4];
-        bytes.copy_from_slice(&treelet[at..at + 4]);
-        f32::from_le_bytes(bytes)
-    };
-    (end(lo), end(hi))
+
+    /// Writes the codes of a slab, or its ends in encoding F32, into bytes that are zero so far.
+    #[inline]
+    fn write(&self, treelet: &mut [u8], slab: usize, (code_lo, code_hi): (u16, u16), ends: (f32, f32)) {
+        let (lo, hi) = self.of(slab);
+        if self.upper == 0 {
+            let code = |code: u16| if self.is_short { short_code(code) } else { code as u8 };
+            treelet[lo] = code(code_lo) | code(code_hi) << 4;
+            return;
+        }
+        match self.encoding {
+            Encoding::U4 | Encoding::U8 => (treelet[lo], treelet[hi]) = (code_lo as u8, code_hi as u8),
+            Encoding::F16 => {
+                treelet[lo..lo + 2].copy_from_slice(&code_lo.to_le_bytes());
+                treelet[hi..hi + 2].copy_from_slice(&code_hi.to_le_bytes());
+            }
+            Encoding::F32 => {
+                treelet[lo..lo + 4].copy_from_slice(&ends.0.to_le_bytes());
+                treelet[hi..hi + 4].copy_from_slice(&ends.1.to_le_bytes());
+            }
+        }
+    }
 }
 
 /// Writes the slabs of a treelet's children under the decoded slabs of the treelet, rounding outward.
@@ -313,24 +338,9 @@ impl SlabEncoder {
         let Self { profile, ref parent, ref units } = *self;
         let encoding = profile.encoding();
         let slabs = profile.directions().slabs();
+        let places = CodePlaces::new(profile, treelet, index);
         let mut put = |slab: usize, code_lo: u16, code_hi: u16| {
-            if is_short(treelet) {
-                treelet[short_place(profile, index, slab)] = short_code(code_lo) | short_code(code_hi) << 4;
-                return;
-            }
-            let CodePlace { lo, hi } = place(profile, index, slab);
-            match encoding {
-                Encoding::U4 => treelet[lo] = (code_lo | code_hi << 4) as u8,
-                Encoding::U8 => (treelet[lo], treelet[hi]) = (code_lo as u8, code_hi as u8),
-                Encoding::F16 => {
-                    treelet[lo..lo + 2].copy_from_slice(&code_lo.to_le_bytes());
-                    treelet[hi..hi + 2].copy_from_slice(&code_hi.to_le_bytes());
-                }
-                Encoding::F32 => {
-                    treelet[lo..lo + 4].copy_from_slice(&child.lo[slab].to_le_bytes());
-                    treelet[hi..hi + 4].copy_from_slice(&child.hi[slab].to_le_bytes());
-                }
-            }
+            places.write(treelet, slab, (code_lo, code_hi), (child.lo[slab], child.hi[slab]));
         };
         match encoding {
             Encoding::U4 | Encoding::U8 => {
@@ -409,7 +419,7 @@ mod tests {
             }
             for slab in 0..profile.directions().slabs() {
                 for child in 0..profile.width() {
-                    let CodePlace { lo, hi } = place(profile, child, slab);
+                    let (lo, hi) = CodePlaces::new(profile, &vec![0; bytes], child).of(slab);
                     used[lo..lo + size].iter_mut().for_each(|u| *u += 1);
                     if profile.encoding() != Encoding::U4 {
                         used[hi..hi + size].iter_mut().for_each(|u| *u += 1);
@@ -459,13 +469,14 @@ mod tests {
             assert_eq!(Links::read(profile, &treelet), links, "{}", profile.name());
             // Codes leave the links as they are, and the other way round.
             for child in 0..profile.width() {
+                let places = CodePlaces::new(profile, &treelet, child);
                 for slab in 0..profile.directions().slabs() {
-                    treelet[short_place(profile, child, slab)] = 0x93;
+                    treelet[places.of(slab).0] = 0x93;
                 }
             }
             assert_eq!(Links::read(profile, &treelet), links, "{}", profile.name());
-            let codes = read_codes(profile, &treelet, profile.width() - 1, profile.directions().slabs() - 1);
-            assert_eq!(codes, (32, 103));
+            let places = CodePlaces::new(profile, &treelet, profile.width() - 1);
+            assert_eq!(places.read(&treelet, profile.directions().slabs() - 1), (32, 103));
         }
     }
 

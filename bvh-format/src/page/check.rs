@@ -9,7 +9,7 @@ use crate::profile::Encoding;
 use crate::quantize::F16_MAX_CODE;
 use crate::rule::Rule;
 use crate::slabs::{NodeSlabs, row};
-use crate::treelet::{read_codes, read_ends};
+use crate::treelet::CodePlaces;
 
 /// Checks everything that can be checked in a page alone: its checksum, shape, anchors, codes and links. `number` is
 /// the page's number in the node section, and `at` its byte offset in the file.
@@ -84,9 +84,10 @@ fn check_codes(page: &Page, at: u64) -> Result<(), FormatError> {
         let treelet = page.treelet(slot);
         let at = at + page.treelet_at(slot) as u64;
         for child in 0..page.links(slot).children().min(profile.width()) {
+            let places = CodePlaces::new(profile, treelet, child);
             for slab in 0..profile.directions().slabs() {
-                let (code_lo, code_hi) = read_codes(profile, treelet, child, slab);
-                let (lo, hi) = read_ends(profile, treelet, child, slab);
+                let (code_lo, code_hi) = places.read(treelet, slab);
+                let (lo, hi) = places.read_ends(treelet, slab);
                 let finite = match profile.encoding() {
                     Encoding::F16 => code_lo <= F16_MAX_CODE && code_hi <= F16_MAX_CODE,
                     _ => lo.abs() <= MAX_END && hi.abs() <= MAX_END,
