@@ -126,11 +126,7 @@ pub fn encode_block(encoding: TriangleEncoding, packets: &[Packet], order: &[u16
 
 fn encode_f32(packets: &[Packet]) -> Vec<u8> {
     let mut block = Vec::with_capacity(packets.len() * F32_PACKET_BYTES + LINE);
-    for packet in packets {
-        for value in packet.corners.iter().flatten().flatten() {
-            block.extend_from_slice(&value.to_le_bytes());
-        }
-    }
+    packets.iter().for_each(|packet| block.extend_from_slice(bytemuck::bytes_of(packet)));
     block
 }
 
