@@ -124,33 +124,46 @@ impl Placement {
     /// Returns the vertex of the file for a vertex of the input, and records in `moved` how far it moved.
     #[inline]
     pub(crate) fn place(&self, position: [f64; 3], moved: &mut Moved) -> [f32; 3] {
-        let mut vertex = [0.0; 3];
-        let (mut rounding, mut quantization) = ([0.0; 3], [0.0; 3]);
+        let (mut vertex, mut moves) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
             let AxisOrigin { origin, grid } = self.axes[axis];
             let mut offset = position[axis] - origin;
             if grid > 0.0 {
                 offset = (offset / grid).round() * grid;
             }
-            let rounded = offset as f32;
-            rounding[axis] = position[axis] - (origin + f64::from(rounded));
-            // If the step is smaller than the spacing of `f32` at the vertex, the vertex is on the grid already. That
-            // includes a step so small that the quotient overflows.
-            let snapped = self.step.map(|step| ((f64::from(rounded) / step).round() * step) as f32);
-            let snapped = snapped.filter(|snapped| snapped.is_finite()).unwrap_or(rounded);
-            quantization[axis] = f64::from(snapped) - f64::from(rounded);
-            // Equal values must have equal bits.
-            vertex[axis] = if snapped == 0.0 { 0.0 } else { snapped };
+            vertex[axis] = offset as f32;
+            moves[axis] = position[axis] - (origin + f64::from(vertex[axis]));
         }
-        moved.rounding = moved.rounding.max(norm(rounding));
-        moved.quantization = moved.quantization.max(norm(quantization));
-        vertex
+        moved.rounding = max_norm(moved.rounding, moves);
+        if let Some(step) = self.step {
+            for axis in 0..3 {
+                let rounded = f64::from(vertex[axis]);
+                // If the step is smaller than the spacing of `f32` at the vertex, the vertex is on the grid already. That
+                // includes a step so small that the quotient overflows.
+                let snapped = ((rounded / step).round() * step) as f32;
+                vertex[axis] = if snapped.is_finite() { snapped } else { vertex[axis] };
+                moves[axis] = f64::from(vertex[axis]) - rounded;
+            }
+            moved.quantization = max_norm(moved.quantization, moves);
+        }
+        // Equal values must have equal bits.
+        vertex.map(|value| if value == 0.0 { 0.0 } else { value })
     }
 }
 
 /// Returns the distance from `value` to the next larger `f64`, a power of two.
 fn spacing(value: f64) -> f64 {
     value.next_up() - value
+}
+
+/// Returns `least.max(norm(v))`, without the divisions and the root of `norm` for a vector that is certainly shorter than
+/// `least`.
+#[inline]
+fn max_norm(least: f64, v: [f64; 3]) -> f64 {
+    // The sum, its comparand and `norm` are each wrong by less than 2^-50 of themselves, besides squares that vanish. What
+    // is added makes up for those. A sum that overflows is no shorter.
+    let sum = v.iter().map(|c| c * c).sum::<f64>() + 8.0 * f64::MIN_POSITIVE;
+    if sum < least * least * (1.0 - 2f64.powi(-48)) { least } else { least.max(norm(v)) }
 }
 
 /// Returns the length of a vector, scaled such that squares neither overflow nor vanish.

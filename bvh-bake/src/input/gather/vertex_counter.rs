@@ -1,6 +1,7 @@
 //! Counts the distinct vertices that runs of faces use.
 
-/// The most numbers that wait to be counted. If there are more, they are marked in a bit field.
+/// The most numbers that wait to be counted. More are marked in a bit field, and so are those of which the field takes no
+/// more memory than they do.
 const WAITING: usize = 1 << 20;
 
 /// Counts the distinct numbers of one run after another.
@@ -20,7 +21,7 @@ impl Counter {
             return;
         }
         self.waiting.push(number);
-        if self.waiting.len() == WAITING {
+        if self.waiting.len() == WAITING || self.waiting.len() as u64 * 32 >= numbers {
             self.marked.resize(numbers.div_ceil(64) as usize, 0);
             std::mem::take(&mut self.waiting).into_iter().for_each(|number| self.mark(number));
         }
