@@ -99,14 +99,16 @@ impl Instance {
 
 /// Returns how far `R R^T` is from a multiple of I: the largest entry of the difference, or NaN.
 pub fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
-    let mut worst = 0.0f64;
+    // The bits of magnitudes are in the order of the magnitudes, and those of NaN are greater than all others.
+    let mut worst = 0;
     for i in 0..3 {
-        for j in 0..3 {
+        // The product is symmetric, to the bit.
+        for j in i..3 {
             let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
-            worst = if error.abs() > worst || error.is_nan() { error.abs() } else { worst };
+            worst = worst.max(error.abs().to_bits());
         }
     }
-    worst
+    f64::from_bits(worst)
 }
 
 /// Returns the determinant of three rows, which is negative for a reflection.
