@@ -238,13 +238,12 @@ impl Contents {
 
     /// Moves instances.
     pub(super) fn carry_out(&mut self, moves: Vec<Move>) {
-        for Move { place, world, kept } in moves {
-            self.change(place, |instance| {
-                instance.world = world;
-                if let Some((attached, kept)) = instance.attached.as_mut().zip(kept) {
-                    attached.kept = kept;
-                }
-            });
-        }
+        let moves = moves.into_iter().map(|Move { place, world, kept }| (place, (world, kept)));
+        self.change_each(moves, |instance, (world, kept)| {
+            instance.world = world;
+            if let Some((attached, kept)) = instance.attached.as_mut().zip(kept) {
+                attached.kept = kept;
+            }
+        });
     }
 }

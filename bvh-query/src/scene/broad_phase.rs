@@ -56,7 +56,7 @@ impl BroadPhase {
         }
     }
 
-    /// Records that an instance has moved.
+    /// Records that an instance has moved. The boxes above it are out of date until [`settle`](Self::settle).
     pub(super) fn set_box(&mut self, item: Item) {
         // A build takes all instances as they are then: poses set before it say nothing about which ones move.
         let Some(has_moved) = self.has_moved.get_mut(item.place as usize).filter(|_| !self.is_stale) else {
@@ -77,6 +77,13 @@ impl BroadPhase {
             Some(true) => self.moving.set(item),
             _ => self.still.set(item),
         }
+        self.settle();
+    }
+
+    /// Computes the boxes above all instances that have moved.
+    pub(super) fn settle(&mut self) {
+        self.still.settle();
+        self.moving.settle();
     }
 
     /// Returns whether a question has to build a tree first.
@@ -107,8 +114,7 @@ impl BroadPhase {
         budget: &mut Budget,
         mut visit: impl FnMut(u32, u32, f64) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, QueryError> {
-        // Room for most searches, so that they allocate once.
-        let mut open = Vec::with_capacity(64);
+        let mut open = Vec::new();
         for trees in [(&self.still, &self.still), (&self.moving, &self.still), (&self.moving, &self.moving)] {
             if pairs(trees, limit, budget, &mut open, &mut visit)?.is_break() {
                 return Ok(ControlFlow::Break(()));
@@ -193,6 +199,9 @@ struct Tree {
     /// The sum of the girths of the inner nodes, now and after the build.
     girth: f64,
     built_girth: f64,
+    /// The inner nodes below which a box or groups have changed, one bit per node, and how many they are.
+    changed: Vec<u64>,
+    changed_count: usize,
 }
 
 impl Tree {
@@ -233,16 +242,43 @@ impl Tree {
             }
         }
         self.built_girth = self.girth;
+        self.changed.clear();
+        self.changed.resize(self.nodes.len().div_ceil(64), 0);
+        self.changed_count = 0;
     }
 
-    /// Sets the box and the groups of a leaf, and computes those above it.
+    /// Sets the box and the groups of a leaf. Those above it are out of date until `settle`.
     fn set(&mut self, Item { place, bounds, groups }: Item) {
         let Some(&leaf) = self.leaves.get(place as usize).filter(|&&leaf| leaf != NONE) else { return };
         let node = &mut self.nodes[leaf as usize];
         (node.bounds, node.groups) = (bounds, groups);
-        let mut above = node.parent;
-        while above != NONE && self.recompute(above as usize) {
-            above = self.nodes[above as usize].parent;
+        let parent = node.parent;
+        self.mark(parent);
+    }
+
+    /// Marks a node as out of date, if it is one.
+    fn mark(&mut self, number: u32) {
+        if number != NONE {
+            let (word, bit) = (&mut self.changed[number as usize / 64], 1 << (number % 64));
+            self.changed_count += usize::from(*word & bit == 0);
+            *word |= bit;
+        }
+    }
+
+    /// Computes all nodes that are out of date, each once: from the last to the first, since children follow their parents.
+    fn settle(&mut self) {
+        let mut word = self.changed.len();
+        while self.changed_count > 0 {
+            word -= 1;
+            while self.changed[word] != 0 {
+                let bit = self.changed[word].ilog2();
+                self.changed[word] ^= 1 << bit;
+                self.changed_count -= 1;
+                let number = 64 * word + bit as usize;
+                if self.recompute(number) {
+                    self.mark(self.nodes[number].parent);
+                }
+            }
         }
     }
 
@@ -274,8 +310,9 @@ fn pairs(
     }
     let is_one = std::ptr::eq(a, b);
     let squared_limit = limit * limit;
-    open.push((0, 0));
-    while let Some((first, second)) = open.pop() {
+    // Where nothing is near, the roots are all that a search looks at, and then it allocates nothing.
+    let mut next = Some((0, 0));
+    while let Some((first, second)) = next.take().or_else(|| open.pop()) {
         budget.visit()?;
         let (node_a, node_b) = (&a.nodes[first as usize], &b.nodes[second as usize]);
         if !node_a.groups.meet(node_b.groups) {
@@ -284,7 +321,7 @@ fn pairs(
         if is_one && first == second {
             if !node_a.is_leaf() {
                 let [left, right] = node_a.children;
-                open.extend([(left, right), (right, right), (left, left)]);
+                push(open, [(left, right), (right, right), (left, left)]);
             }
             continue;
         }
@@ -299,12 +336,20 @@ fn pairs(
                 }
             }
             (false, is_leaf) if is_leaf || node_a.bounds.girth() >= node_b.bounds.girth() => {
-                open.extend(node_a.children.map(|child| (child, second)));
+                push(open, node_a.children.map(|child| (child, second)));
             }
-            _ => open.extend(node_b.children.map(|child| (first, child))),
+            _ => push(open, node_b.children.map(|child| (first, child))),
         }
     }
     Ok(ControlFlow::Continue(()))
+}
+
+/// Adds pairs of nodes to those that a search has yet to look at, with room for most searches at the first.
+fn push<const N: usize>(open: &mut Vec<(u32, u32)>, pairs: [(u32, u32); N]) {
+    if open.capacity() == 0 {
+        open.reserve(64);
+    }
+    open.extend(pairs);
 }
 
 /// The pairs of places whose groups meet, those with the nearest boxes first: a search of the trees by the least gap.
@@ -538,6 +583,7 @@ mod tests {
                         assert_eq!(broad.has_moved.get(place as usize).copied(), has_moved);
                     } else {
                         broad.set_box(items[number]);
+                        broad.settle();
                     }
                 }
                 grown += usize::from(broad.moving.has_grown());

@@ -6,7 +6,7 @@ use crate::query::motion::size_of;
 use crate::scene::attachments::Attached;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
-use crate::scene::world_box::WorldBox;
+use crate::scene::world_box::{Extent, WorldBox};
 use std::fmt;
 use std::sync::Arc;
 
@@ -51,6 +51,8 @@ pub(super) struct Instance {
     pub(super) shape: SceneShape,
     /// What is added to the radius of the shape, in mesh units.
     pub(super) margin: f64,
+    /// The boxes and spheres of its objects.
+    extents: Arc<[Extent]>,
     /// The largest diagonal of the boxes of its objects, in mesh units.
     pub(super) size: f64,
     pub(super) world: Pose,
@@ -71,7 +73,7 @@ impl Instance {
         world: Pose,
         groups: Groups,
     ) -> Self {
-        let size = size_of(shape.objects(), 0.0);
+        let (extents, size) = measures(&shape);
         let (bounds, allowed, children) = (WorldBox::EMPTY, Vec::new(), Vec::new());
         let (margin, attached) = (0.0, None);
         let mut instance = Self {
@@ -79,6 +81,7 @@ impl Instance {
             name,
             shape,
             margin,
+            extents,
             size,
             world,
             bounds,
@@ -93,7 +96,7 @@ impl Instance {
 
     /// Replaces its shape. Its box is then out of date.
     pub(super) fn set_shape(&mut self, shape: SceneShape) {
-        self.size = size_of(shape.objects(), 0.0);
+        (self.extents, self.size) = measures(&shape);
         self.shape = shape;
     }
 
@@ -114,7 +117,7 @@ impl Instance {
 
     /// Returns its box in the world at a pose.
     pub(super) fn bounds_at(&self, world: &Pose) -> WorldBox {
-        let core = WorldBox::of(self.shape.objects(), world);
+        let core = WorldBox::of(&self.extents, world);
         let radius = self.radius();
         // A's frame may be stretched against the world: see the module of boxes.
         if radius == 0.0 { core } else { core.grown(radius * (1.0 + 1.0 / (1 << 18) as f64)) }
@@ -134,4 +137,10 @@ impl Instance {
     pub(super) fn allows(&self, place: u32) -> bool {
         !self.allowed.is_empty() && self.allowed.binary_search(&place).is_ok()
     }
+}
+
+/// Returns the boxes and spheres of a shape's objects, and its size.
+fn measures(shape: &SceneShape) -> (Arc<[Extent]>, f64) {
+    let objects = shape.objects();
+    (objects.iter().map(Extent::of).collect(), size_of(objects, 0.0))
 }

@@ -122,6 +122,8 @@ pub struct Scene {
     trackers: Trackers,
     stats: QueryStats,
     pairs_asked: u64,
+    /// The poses of the last move of many instances, whose memory the next one uses.
+    moved: Vec<(u32, Pose)>,
 }
 
 impl Clone for Scene {
@@ -134,6 +136,7 @@ impl Clone for Scene {
             trackers: self.trackers.clone(),
             stats: self.stats,
             pairs_asked: self.pairs_asked,
+            moved: Vec::new(),
         }
     }
 
@@ -166,6 +169,7 @@ impl Scene {
             trackers: Trackers::default(),
             stats: QueryStats::default(),
             pairs_asked: 0,
+            moved: Vec::new(),
         }
     }
 
@@ -326,21 +330,21 @@ impl Scene {
         &mut self,
         poses: impl IntoIterator<Item = (InstanceId, Pose)>,
     ) -> Result<(), InstanceError> {
-        let mut places = Vec::new();
+        let mut moved = std::mem::take(&mut self.moved);
+        moved.clear();
         for (id, world) in poses {
             self.contents.check_pose(id, &world)?;
-            places.push((id.place, world));
+            moved.push((id.place, world));
         }
-        self.move_to(&places)
+        let result = self.move_to(&moved);
+        self.moved = moved;
+        result
     }
 
     /// Moves the instances in some places to poses that are valid.
     fn move_to(&mut self, poses: &[(u32, Pose)]) -> Result<(), InstanceError> {
         if self.contents.move_alone(poses.iter().map(|&(place, _)| place)) {
-            let contents = self.contents_mut();
-            for &(place, world) in poses {
-                contents.change(place, |instance| instance.world = world);
-            }
+            self.contents_mut().change_each(poses.iter().copied(), |instance, world| instance.world = world);
         } else {
             let moves = self.contents.moves(poses)?;
             self.contents_mut().carry_out(moves);

@@ -81,6 +81,10 @@ impl Workers {
 
     /// Charges visits to the question.
     pub(super) fn charge(&self, visits: u64) -> Result<(), QueryError> {
+        if self.budget == u64::MAX {
+            // Threads need not wait for each other to count what has no limit.
+            return Ok(());
+        }
         let take = |left: u64| Some(left.saturating_sub(visits));
         // Nothing else is read that depends on it. The update never fails.
         let left = self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take).unwrap_or_default();
@@ -95,7 +99,6 @@ impl Workers {
         ask: impl FnOnce(&mut Querier) -> Result<R, QueryError>,
     ) -> Result<R, QueryError> {
         if self.budget == u64::MAX {
-            // Threads need not wait for each other to count what has no limit.
             return ask(querier);
         }
         querier.set_rest(self.rest());
