@@ -375,6 +375,27 @@ fn the_first_hit_is_found_before_what_has_no_answer() {
     }
 }
 
+/// B slides beside a face at a fortieth of what the tolerance resolves, along ten million cells, none of which is clear.
+#[test]
+fn a_slide_beside_a_face_takes_few_visits() {
+    let (block, gap) = (baked(&cube()), 2.0 + 1e-8);
+    let slide = [at(-3.0, gap, 0.1), at(0.5, gap, 0.2)];
+    let free = Polyline::new(&slide).unwrap();
+    let into = Polyline::new(&[slide[0], slide[1], at(0.5, 1.5, 0.2)]).unwrap();
+    for querier in &mut queriers() {
+        querier.set_budget(1 << 13);
+        let answer = querier.motion(&block, &block, &free, &MotionOptions::new());
+        let Ok(MotionAnswer::Near { free_until, at, nearest }) = answer else { panic!("{answer:?}") };
+        assert!(nearest.distance > 0.99e-8 && at - free_until < 1e-6, "{answer:?}");
+        // The first half of the other path is this one.
+        let answer = querier.motion(&block, &block, &into, &MotionOptions::new());
+        let Ok(MotionAnswer::Hit { free_until: until, touching_at, .. }) = answer else {
+            panic!("{answer:?}")
+        };
+        assert!((until - free_until / 2.0).abs() < 1e-6 && touching_at > 0.5, "{answer:?}");
+    }
+}
+
 #[test]
 fn numbers_that_mean_nothing_are_refused() {
     let (mut querier, block) = (Querier::new().unwrap(), baked(&cube()));

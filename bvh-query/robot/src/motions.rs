@@ -107,8 +107,8 @@ impl Robot {
     /// Returns whether a motion is free, and otherwise what touches first, and when.
     ///
     /// Cost: that of [`Robot::is_edge_free`], and of [`Querier::motion`](bvh_query::Querier::motion) for each pair that is not free, up
-    /// to the first hit that is known. Links that slide along each other until then, less than the tolerance apart, take long, since each
-    /// moment is undecided: allow their contact, or give a larger tolerance.
+    /// to the first hit that is known. Links that turn against each other until then, much less than the tolerance apart, take long:
+    /// allow their contact, or give a larger tolerance.
     ///
     /// # Errors
     /// The errors of [`Robot::is_free`].

@@ -14,7 +14,9 @@
 //! inside only through the surface, so only the start of the path and cells after an undecided one need this test.
 //!
 //! The search skips cells that are certainly clear, many at a time: those of an interval during which everything stays
-//! farther apart than the clearance and an eighth of the tolerance ([`sweep`]). If a sweep leaves few pairs of
+//! farther apart than the clearance and an eighth of the tolerance, which is as far as any cell reaches ([`sweep`]). After
+//! the first undecided cell it skips those that are certainly no hits, because everything stays farther apart than the
+//! clearance. If a sweep leaves few pairs of
 //! triangles, they are kept for the parts of the interval. All other pairs are apart during the whole interval, so
 //! these pairs alone decide. Filters therefore do not affect answers, which have the same bits on every backend.
 
@@ -123,9 +125,10 @@ impl Querier {
     /// a hit.
     ///
     /// Cost: about one contact query for each interval that must be tested. There are few intervals if B keeps a
-    /// distance that is larger than the bend of its path, and some thirty for a hit. If B moves on at a gap below the
-    /// tolerance, there is one query for each eighth of the tolerance that it moves by, because a hit may still follow.
-    /// A budget limits that, and [`Querier::is_free`] avoids it, because it can say no at once.
+    /// distance that is larger than the bend of its path, and some thirty for a hit, or for a gap below the tolerance. If B
+    /// moves on in contact to within rounding, or turns at such a gap, there may be one query for each eighth of the tolerance
+    /// that it moves by, because a hit may still follow. A budget limits that, and [`Querier::is_free`] avoids it, because it can
+    /// say no at once.
     ///
     /// # Errors
     /// [`QueryError::Number`] if the clearance or the tolerance is not a valid number, or if the tolerance is too small

@@ -93,13 +93,13 @@ impl<'a> Question<'a> {
         Middle { at, pose, reach }
     }
 
-    /// Returns how far apart parts must be at both ends of an interval to be left out. They are then farther apart than
-    /// the clearance and an eighth of the tolerance all the time, which is as far as any cell reaches.
-    pub(super) fn limit(&self, stretch: &Stretch) -> f64 {
+    /// Returns how far apart parts must be at both ends of an interval to be farther apart than the sum of the clearance and
+    /// `reach` all the time.
+    pub(super) fn limit(&self, stretch: &Stretch, reach: f64) -> f64 {
         let [t0, t1] = stretch.times;
         let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
         let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
-        let least = self.clearance + self.tolerance / 8.0 + self.sagitta(t0, t1);
+        let least = self.clearance + reach + self.sagitta(t0, t1);
         least * (1.0 + ROUNDING) + ROUNDING * magnitude
     }
 

@@ -10,6 +10,8 @@
 //!     else: halve it
 //! ```
 //!
+//! After an undecided cell, only hits matter, so that an interval is skipped even if the meshes come nearer than a cell reaches.
+//!
 //! Descending is a guess, and a wrong guess costs little. The search does not assume that the time before the cell is
 //! free: it sweeps that time or searches it. The time after the cell waits.
 
@@ -96,13 +98,13 @@ pub(super) struct TimeSearch<'s, 'a> {
     question: &'s Question<'a>,
     /// The start of the interval that is looked at in the order of time: all before has been decided.
     pub(super) decided_until: f64,
-    /// Whether a part may have passed the surface of a solid shape: an undecided cell came before.
-    may_be_inside: bool,
+    /// The start and the middle of the first undecided cell.
+    undecided: Option<(f64, f64)>,
 }
 
 impl<'s, 'a> TimeSearch<'s, 'a> {
     pub(super) fn new(querier: &'s mut Querier, question: &'s Question<'a>) -> Self {
-        Self { querier, question, decided_until: 0.0, may_be_inside: false }
+        Self { querier, question, decided_until: 0.0, undecided: None }
     }
 
     /// Returns the first hit, or the first cell that is undecided. It ignores the time after the earliest hit of all
@@ -131,7 +133,6 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     /// Looks at an interval and its parts in the order of time.
     fn in_order(&mut self, interval: Interval, earliest: &Earliest) -> Result<Outcome, QueryError> {
-        let mut undecided: Option<(f64, f64)> = None;
         let mut todo = vec![interval];
         while let Some(interval) = todo.pop() {
             self.decided_until = interval.stretch.times[0];
@@ -144,19 +145,16 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
                 match self.decide(&interval, &middle)? {
                     Cell::Clear => {}
                     Cell::Hit => {
-                        let free_until = undecided.map_or(start, |(free_until, _)| free_until);
+                        let free_until = self.undecided.map_or(start, |(free_until, _)| free_until);
                         return Ok(Outcome::Hit { free_until, touching_at: middle.at });
                     }
-                    Cell::Undecided => {
-                        undecided.get_or_insert((start, middle.at));
-                        self.may_be_inside = self.question.is_solid;
-                    }
+                    Cell::Undecided => _ = self.undecided.get_or_insert((start, middle.at)),
                 }
             } else {
                 self.look(interval, &middle, &mut todo)?;
             }
         }
-        Ok(undecided.map_or(Outcome::Free, |(free_until, at)| Outcome::Undecided { free_until, at }))
+        Ok(self.undecided.map_or(Outcome::Free, |(free_until, at)| Outcome::Undecided { free_until, at }))
     }
 
     /// Returns whether there is neither a hit nor an undecided cell. Long intervals come first while there are few of
@@ -210,14 +208,14 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     /// Decides a cell by the definition.
     fn decide(&mut self, interval: &Interval, middle: &Middle) -> Result<Cell, QueryError> {
-        let clearance = self.question.clearance;
+        let (clearance, may_be_inside) = (self.question.clearance, self.may_be_inside());
         let mut is_within = |d: f64| match &interval.pairs {
             Some(pairs) => Ok(self.querier.any_pair_within(pairs.left(), &middle.pose, d)),
             None => self.is_within(&middle.pose, d),
         };
         // Rounded up: where the reach is small beside the clearance, it must not vanish.
         let near = is_within((clearance + middle.reach).next_up())?;
-        if near && is_within(clearance)? || self.may_be_inside && self.is_inside(&middle.pose)? {
+        if near && is_within(clearance)? || may_be_inside && self.is_inside(&middle.pose)? {
             return Ok(Cell::Hit);
         }
         Ok(if near { Cell::Undecided } else { Cell::Clear })
@@ -268,7 +266,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         middle: &Middle,
         todo: &mut Vec<Interval>,
     ) -> Result<(), QueryError> {
-        if !self.may_be_inside || !self.is_inside(&middle.pose)? {
+        if !self.may_be_inside() || !self.is_inside(&middle.pose)? {
             return Ok(());
         }
         loop {
@@ -279,6 +277,18 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             }
             [interval, _] = self.halves(&interval, &middle)?;
         }
+    }
+
+    /// Returns whether a part may have passed the surface of a solid shape: an undecided cell came before.
+    fn may_be_inside(&self) -> bool {
+        self.question.is_solid && self.undecided.is_some()
+    }
+
+    /// Returns how far apart parts must be at both ends of an interval to be left out. In what is left out, all cells are clear.
+    /// Once a cell is undecided, later ones matter only if they are hits, and then none of them is a hit.
+    fn limit(&self, stretch: &Stretch) -> f64 {
+        let reach = if self.undecided.is_none() { self.question.tolerance / 8.0 } else { 0.0 };
+        self.question.limit(stretch, reach)
     }
 
     /// Returns whether a pose is a hit.
@@ -349,7 +359,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             let middle = self.question.middle(&stretch).pose;
             let pairs = self.not_apart(&joined, &middle)?;
             let is_apart = pairs.as_ref().is_some_and(|pairs| pairs.left().is_empty());
-            if !is_apart || self.may_be_inside && self.is_inside(&middle)? {
+            if !is_apart || self.may_be_inside() && self.is_inside(&middle)? {
                 todo.extend(group.iter().map(|one| Interval { pairs: pairs.clone(), ..one.clone() }));
             }
         }
@@ -368,7 +378,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         };
         let is_safe = |count: &usize| {
             let stretch = joined(*count);
-            speed * (time - stretch.times[1]) >= SAFE_REST * self.question.limit(&stretch)
+            speed * (time - stretch.times[1]) >= SAFE_REST * self.limit(&stretch)
         };
         let count = (2..=rest.len()).rev().find(is_safe).unwrap_or(1);
         (count, joined(count))
@@ -397,7 +407,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
         let question = self.question;
         let [start, end] = interval.stretch.poses;
-        let sweep = Sweep { start, middle: *middle, end, limit: question.limit(&interval.stretch) };
+        let sweep = Sweep { start, middle: *middle, end, limit: self.limit(&interval.stretch) };
         let pairs = match &interval.pairs {
             Some(pairs) => pairs.clone(),
             None => {
