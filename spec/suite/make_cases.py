@@ -585,6 +585,12 @@ def make_grazing(maker):
         maker.add("motions", "motion", ("ring", b), items, "motions through a hole, along its walls, 2^-12 beside them or 2^-28 into them", ("motion", "grazing"), 2)
 
 
+def make_slides(maker):
+    random, box = meshes.Random(1000), "box"
+    items = [grazing_motion(random, box, box, IDENTITY, (1, 0, 0), -Fraction(1, 2**bits)) for bits in (16, 20, 28)]
+    maker.add("motions", "motion", (box, box), items, "motions along a face, 2^-16 to 2^-28 beside it all the time", ("motion", "grazing"), 3)
+
+
 def make_depths_of_parts(maker):
     random = meshes.Random(900)
     for a in GROUPS:
@@ -607,7 +613,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     jobs = parser.parse_args().jobs
     maker = Maker()
-    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_grazing, make_depths_of_parts, make_self_contacts):
+    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_grazing, make_slides, make_depths_of_parts, make_self_contacts):
         make(maker)
     CASES.mkdir(exist_ok=True)
     cases = [case for of in maker.cases.values() for case in of]
