@@ -353,7 +353,8 @@ impl Scene {
     /// Asks the pairs at most `limit` apart until one says yes.
     fn any(&mut self, limit: f64, ask: YesOrNo<'_>) -> Result<bool, SceneError> {
         self.start();
-        let likely = self.likely_pair();
+        let squared_limit = (limit + self.contents.reach_of_pairs()).powi(2);
+        let likely = self.likely_pair().filter(|likely| likely.squared_gap <= squared_limit);
         if let Some(likely) = likely
             && self.any_of(&[likely], ask)?
         {
@@ -495,9 +496,9 @@ impl Scene {
     /// Returns the pair of the last answer, if it is still asked about.
     fn likely_pair(&self) -> Option<NearPair> {
         let (a, b) = self.likely?;
-        let near_pair = NearPair { a, b, squared_gap: 0.0 };
-        let (first, second) = self.both(&near_pair)?;
-        (first.groups.meet(second.groups) && !first.allows(b)).then_some(near_pair)
+        let (first, second) = self.instances_at(a, b)?;
+        let squared_gap = first.bounds.squared_gap(&second.bounds);
+        (first.groups.meet(second.groups) && !first.allows(b)).then_some(NearPair { a, b, squared_gap })
     }
 
     /// Makes a tracker for each candidate, if the scene wants that.

@@ -272,6 +272,22 @@ fn a_tree_of_boxes_misses_no_pair_wherever_instances_move() {
     }
 }
 
+/// The pair that was in contact in the last question is asked first, but only where its boxes still meet.
+#[test]
+fn a_pair_that_has_parted_is_not_asked() {
+    let at = |x: f64| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]).unwrap();
+    for mut scene in scenes() {
+        let cube = shape(&cube());
+        scene.add(cube.clone(), at(0.0)).unwrap();
+        let moving = scene.add(cube.clone(), at(1.5)).unwrap();
+        for (x, is_hit, asked) in [(1.5, true, 1), (9.0, false, 0), (2.0, true, 1), (2.5, false, 0)] {
+            scene.set_pose(moving, at(x)).unwrap();
+            assert_eq!((scene.collide().unwrap(), scene.pairs_asked()), (is_hit, asked), "{x}");
+            assert_eq!(scene.within(3.0).unwrap(), x < 9.0);
+        }
+    }
+}
+
 /// Three in a row at equal distances: the first pair is the answer, whichever was nearest before. A question about pairs that
 /// need no asking costs nothing.
 #[test]
