@@ -375,7 +375,7 @@ fn the_first_hit_is_found_before_what_has_no_answer() {
     }
 }
 
-/// B slides beside a face at a fortieth of what the tolerance resolves, along ten million cells, none of which is clear.
+/// B slides beside a face at a fortieth of the reach of a cell, along eight million cells, none of which is clear.
 #[test]
 fn a_slide_beside_a_face_takes_few_visits() {
     let (block, gap) = (baked(&cube()), 2.0 + 1e-8);
@@ -386,6 +386,7 @@ fn a_slide_beside_a_face_takes_few_visits() {
         querier.set_budget(1 << 13);
         let answer = querier.motion(&block, &block, &free, &MotionOptions::new());
         let Ok(MotionAnswer::Near { free_until, at, nearest }) = answer else { panic!("{answer:?}") };
+        // The gap is 1e-8 but for the rounding of 2, and a cell is a ten-millionth of the way.
         assert!(nearest.distance > 0.99e-8 && at - free_until < 1e-6, "{answer:?}");
         // The first half of the other path is this one.
         let answer = querier.motion(&block, &block, &into, &MotionOptions::new());

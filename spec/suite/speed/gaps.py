@@ -20,12 +20,12 @@ import truth
 from exact import root_bounds
 
 EDGES = np.array(truth.EDGES)
-# A placed coordinate is three products and three sums of numbers whose magnitudes add up to at most M. Each of the five roundings on
-# its way is at most 2^-53 of M, or a little more, so that it is off by less than 6 * 2^-53 M, which is below 2^-50 M.
-PLACING_ERROR = 2.0**-50
-# A slab is dot products of a direction of length at most 2 with placed corners. Three coordinates, each off by 2^-50 M and multiplied
-# by at most 2, and five roundings of sums of at most 6 M, are below 2^-46 M. A quotient and a difference more are within 2^-45 M.
-# The same holds for slabs between boxes, whose centres and half sides are off by 2^-53 M, and which sum over six half sides.
+# What a slab may be off by, as a part of M, the magnitudes that are added to make the largest placed coordinate. A placed coordinate is
+# three products and three sums. Each of the five roundings on its way is at most 2^-53 M, or a little more, so that it is off by less
+# than 6 * 2^-53 M, which is below 2^-50 M. A slab is dot products of a direction of length at most 2 with placed corners. Three
+# coordinates, each off by 2^-50 M and multiplied by at most 2, and five roundings of sums of at most 6 M, are below 2^-46 M. A quotient
+# and a difference more are within 2^-45 M. The same holds for slabs between boxes, whose centres and half sides are off by 2^-53 M, and
+# which sum over six half sides.
 SLAB_ERROR = 2.0**-45
 # Once `FIRST` pairs are computed exactly, a lower bound that is less than this part below the upper bound is good enough.
 SLACK = 1e-9
@@ -105,7 +105,7 @@ def integer(x, bits):
 
 
 def moved(points, pose):
-    """Returns points at R x + t, with the error that `PLACING_ERROR` bounds."""
+    """Returns points at R x + t, whose error `SLAB_ERROR` includes."""
     r = np.array(pose).reshape(3, 4)
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     return np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in r], -1)

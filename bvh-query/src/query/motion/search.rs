@@ -284,8 +284,8 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         self.question.is_solid && self.undecided.is_some()
     }
 
-    /// Returns how far apart parts must be at both ends of an interval to be left out. In what is left out, all cells are clear.
-    /// Once a cell is undecided, later ones matter only if they are hits, and then none of them is a hit.
+    /// Returns how far apart parts must be at both ends of an interval to be left out. Before the first undecided cell, all cells
+    /// of what is left out are clear. After it, only hits matter, and none of these cells is one.
     fn limit(&self, stretch: &Stretch) -> f64 {
         let reach = if self.undecided.is_none() { self.question.tolerance / 8.0 } else { 0.0 };
         self.question.limit(stretch, reach)
