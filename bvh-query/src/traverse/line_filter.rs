@@ -17,7 +17,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::traverse::align::{FACTORS_BY_AXIS, U};
-use crate::traverse::point_filter::quads;
+use crate::traverse::point_filter::{in_all_columns, quads, rows_without_slab};
 use bvh_format::kdop::DirectionSet;
 use bvh_format::slabs::Group;
 
@@ -61,22 +61,15 @@ impl LineFilter {
             inverse[row] = (1.0 / q_or_least) as f32;
         }
         // Segments are in rows without a slab from -infinity to infinity.
-        let rows_without_slab: &[usize] = match set {
-            DirectionSet::Dop6 => &[3],
-            DirectionSet::Dop14 => &[7],
-            DirectionSet::Dop26 => &[7, 14, 15],
-        };
-        for &row in rows_without_slab {
+        for &row in rows_without_slab(set) {
             (above[row], below[row], inverse[row]) = (f32::INFINITY, f32::NEG_INFINITY, 1.0);
         }
-        let mut test = Self { set, above: [[0.0; 16]; 4], below: [[0.0; 16]; 4], inverse: [[0.0; 16]; 4] };
-        let rows = [above.as_chunks::<4>().0, below.as_chunks::<4>().0, inverse.as_chunks::<4>().0];
-        for quad in 0..4 {
-            isa.store(isa.repeat(&rows[0][quad]), &mut test.above[quad]);
-            isa.store(isa.repeat(&rows[1][quad]), &mut test.below[quad]);
-            isa.store(isa.repeat(&rows[2][quad]), &mut test.inverse[quad]);
+        Self {
+            set,
+            above: in_all_columns(isa, &above),
+            below: in_all_columns(isa, &below),
+            inverse: in_all_columns(isa, &inverse),
         }
-        test
     }
 
     /// Returns where the segment enters four nodes, from 0 to 1; infinity where it does not.

@@ -12,8 +12,9 @@
 //! what becomes of squares that underflow.
 
 use crate::isa::{Isa, Lanes};
+use crate::traverse::align::FACTORS_BY_AXIS;
 use crate::traverse::node_filter::INVERSE_LENGTHS;
-use bvh_format::kdop::{DirectionSet, FACTORS};
+use bvh_format::kdop::DirectionSet;
 use bvh_format::slabs::{Group, row};
 
 /// A point's slabs, in all four columns, and what makes a distance of a gap.
@@ -24,6 +25,17 @@ pub(crate) struct PointFilter {
     set: DirectionSet,
 }
 
+/// The inverse lengths of directions by rows.
+const INVERSE_LENGTHS_BY_ROW: [f32; 16] = {
+    let mut inverse = [1.0; 16];
+    let mut slab = 0;
+    while slab < 13 {
+        inverse[row(slab)] = INVERSE_LENGTHS[slab];
+        slab += 1;
+    }
+    inverse
+};
+
 /// More than `f32` loses of a subnormal number, 2^-148.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 148) << 52);
 
@@ -31,25 +43,26 @@ impl PointFilter {
     /// Prepares the test of a point around the object's origin; `error` bounds that of its coordinates added up. `scale` is
     /// the inverse of the unit, a power of two.
     #[inline(always)]
-    pub(crate) fn new(point: &[f64; 3], set: DirectionSet, error: f64, scale: f32) -> Self {
-        // Rows without a slab have the whole line: their gaps are -infinity.
-        let mut test = Self {
-            slabs: Group { lo: [[f32::NEG_INFINITY; 16]; 4], hi: [[f32::INFINITY; 16]; 4] },
-            inverse_lengths: [[scale; 16]; 4],
-            set,
-        };
-        for slab in 0..set.slabs() {
-            let along =
-                FACTORS[slab][0] * point[0] + FACTORS[slab][1] * point[1] + FACTORS[slab][2] * point[2];
+    pub(crate) fn new<I: Isa>(isa: I, point: &[f64; 3], set: DirectionSet, error: f64, scale: f32) -> Self {
+        let (mut lo, mut hi, mut inverse_lengths) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+        let [x, y, z] = &FACTORS_BY_AXIS;
+        for row in 0..16 {
+            let along = x[row] * point[0] + y[row] * point[1] + z[row] * point[2];
             // Rounding to `f32` moves an end by half as much or less.
             let outward = 2.0 * error + along.abs() * f64::from(f32::EPSILON) + UNDERFLOW;
-            let at = row(slab);
-            let (quad, lanes) = (at / 4, 4 * (at % 4)..4 * (at % 4) + 4);
-            test.slabs.lo[quad][lanes.clone()].fill((along - outward) as f32);
-            test.slabs.hi[quad][lanes.clone()].fill((along + outward) as f32);
-            test.inverse_lengths[quad][lanes].fill(INVERSE_LENGTHS[slab] * scale);
+            lo[row] = (along - outward) as f32;
+            hi[row] = (along + outward) as f32;
+            inverse_lengths[row] = INVERSE_LENGTHS_BY_ROW[row] * scale;
         }
-        test
+        // Rows without a slab have the whole line: their gaps are -infinity.
+        for &row in rows_without_slab(set) {
+            (lo[row], hi[row]) = (f32::NEG_INFINITY, f32::INFINITY);
+        }
+        Self {
+            slabs: Group { lo: in_all_columns(isa, &lo), hi: in_all_columns(isa, &hi) },
+            inverse_lengths: in_all_columns(isa, &inverse_lengths),
+            set,
+        }
     }
 
     /// Returns lower bounds of the distances of four nodes, in units of the test. Where the point is in all slabs of a node,
@@ -101,4 +114,23 @@ impl PointFilter {
 pub(super) fn quads<I: Isa>(isa: I, rows: &[f32; 16]) -> [I::H; 4] {
     let rows = rows.as_chunks::<4>().0;
     [isa.load4(&rows[0]), isa.load4(&rows[1]), isa.load4(&rows[2]), isa.load4(&rows[3])]
+}
+
+/// The rows without a slab among those that are tested.
+pub(super) fn rows_without_slab(set: DirectionSet) -> &'static [usize] {
+    match set {
+        DirectionSet::Dop6 => &[3],
+        DirectionSet::Dop14 => &[7],
+        DirectionSet::Dop26 => &[7, 14, 15],
+    }
+}
+
+/// Returns the numbers of sixteen rows, each in all four columns.
+#[inline(always)]
+pub(super) fn in_all_columns<I: Isa>(isa: I, rows: &[f32; 16]) -> [[f32; 16]; 4] {
+    let mut quads = [[0.0; 16]; 4];
+    for (quad, rows) in quads.iter_mut().zip(rows.as_chunks().0) {
+        isa.store(isa.repeat(rows), quad);
+    }
+    quads
 }

@@ -9,9 +9,10 @@
 //!     push the others within the limit as a level, if there are any
 //! ```
 //!
-//! Unlike a pair walk, it meets each node once, so it decodes nodes where it needs them, into the levels of its stack, and
-//! keeps none. Lanes are slabs and children, so that one probe fills them ([`crate::traverse::point_filter`],
-//! [`crate::traverse::line_filter`]). The walk ends because a file is a tree, and has no more levels than that.
+//! A walk meets each node once, but most walks of a mesh meet the nodes near its root. These stay decoded from one walk to the
+//! next, and the others are decoded into the levels of the stack. Lanes are slabs and children, so that one probe fills them
+//! ([`crate::traverse::point_filter`], [`crate::traverse::line_filter`]). The walk ends because a file is a tree, and has
+//! no more levels than that.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
@@ -38,23 +39,77 @@ pub(crate) trait ProbeVisitor {
 /// The children of an opened node.
 #[derive(Clone)]
 #[repr(C, align(64))]
-struct PendingChildren {
+struct OpenedNode {
     groups: [Group; 2],
-    /// Of the inner children that are left; `GONE` for the others.
-    bounds: [f32; 8],
     links: Links,
     page: u32,
+    /// A bit for each child that is an inner node, and for each that is a leaf packet.
+    inner: u8,
+    leaves: u8,
+    /// The numbers of the nodes of its children that are kept; `CLOSED` for others.
+    kept: [u32; 8],
+}
+
+/// Stands for the number of a node that is not kept.
+const CLOSED: u32 = u32::MAX;
+
+impl OpenedNode {
+    const EMPTY: Self = Self {
+        groups: [Group::ZERO; 2],
+        links: Links::NONE,
+        page: 0,
+        inner: 0,
+        leaves: 0,
+        kept: [CLOSED; 8],
+    };
+
+    /// Opens a child of another node. Returns whether it is an inner node.
+    #[inline(always)]
+    fn read<I: Isa>(
+        &mut self,
+        isa: I,
+        (bvh, object): (&Bvh, &Object),
+        parent: &Self,
+        child: usize,
+    ) -> Result<bool, QueryError> {
+        let from = (&parent.groups, &parent.links, parent.page);
+        let Some(Opened { links, page, .. }) = open_child(isa, (bvh, object), from, child, &mut self.groups)?
+        else {
+            return Ok(false);
+        };
+        if bvh.is_worth_prefetching() {
+            for treelets in page.treelets_ahead(&links) {
+                prefetch_ahead(isa, treelets);
+            }
+        }
+        let leaves = leaf_lanes(&links, 0) | leaf_lanes(&links, 1) << 4;
+        let children = (1u16 << links.children().min(object.profile().width())) - 1;
+        (self.links, self.page) = (links, page.header().page_number.get());
+        self.kept = [CLOSED; 8];
+        (self.inner, self.leaves) = ((children & !leaves) as u8, (children & leaves) as u8);
+        Ok(true)
+    }
+}
+
+/// What is left to visit of an opened node.
+struct Level {
+    /// Bounds of the inner children that are left; `GONE` for the others.
+    bounds: [f32; 8],
+    /// The number of the node.
+    node: u32,
+    /// The number of the level's own node, which it has unless the node is kept.
+    own: u32,
 }
 
 /// The bound of a child that is not to be visited.
 const GONE: f32 = f32::INFINITY;
 
-/// What makes the bounds of four children `GONE` whose bits are set, by their maximum.
+/// What makes the bounds of four children `GONE` whose bits are not set, by their maximum.
 static HIDDEN: [[f32; 4]; 16] = {
     let mut hidden = [[f32::NEG_INFINITY; 4]; 16];
     let mut at = 0;
     while at < 64 {
-        if (at / 4) >> (at % 4) & 1 == 1 {
+        if (at / 4) >> (at % 4) & 1 == 0 {
             hidden[at / 4][at % 4] = GONE;
         }
         at += 1;
@@ -62,43 +117,45 @@ static HIDDEN: [[f32; 4]; 16] = {
     hidden
 };
 
-impl PendingChildren {
-    const EMPTY: Self = Self { groups: [Group::ZERO; 2], bounds: [GONE; 8], links: Links::NONE, page: 0 };
-
-    /// Removes the nearest child that is left, if its bound is at most `limit`.
+impl Level {
+    /// Removes the nearest child that is left, the first of equally near ones, if its bound is at most `limit`. No branch
+    /// could predict which one it is.
     #[inline(always)]
-    fn take_nearest(&mut self, parts: usize, limit: f32) -> Option<usize> {
-        let mut child = self.nearest_of(0);
-        if parts == 2 {
-            child = self.nearer(child, self.nearest_of(4));
+    fn take_nearest<I: Isa>(&mut self, isa: I, parts: usize, limit: f32) -> Option<usize> {
+        let less = |x: f32, y: f32| if x < y { x } else { y };
+        let least_of = |quad: &[f32; 4]| less(less(quad[0], quad[1]), less(quad[2], quad[3]));
+        let [first, second] = self.bounds.as_chunks::<4>().0 else { return None };
+        let is_wide = parts == 2;
+        let least = if is_wide { less(least_of(first), least_of(second)) } else { least_of(first) };
+        if !(least <= limit && least != GONE) {
+            return None;
         }
-        let bound = std::mem::replace(&mut self.bounds[child & 7], GONE);
-        (bound <= limit && bound != GONE).then_some(child)
-    }
-
-    /// Returns the nearest of four children.
-    #[inline(always)]
-    fn nearest_of(&self, first: usize) -> usize {
-        self.nearer(self.nearer(first, first + 1), self.nearer(first + 2, first + 3))
-    }
-
-    /// Returns the nearer of two children, the first of equal ones. No branch could be predicted here.
-    #[inline(always)]
-    fn nearer(&self, first: usize, second: usize) -> usize {
-        first + (second - first) * usize::from(self.bounds[second & 7] < self.bounds[first & 7])
+        let equal = |quad: &[f32; 4]| u32::from(I::H::bits(isa.load4(quad).le(isa.splat4(least))));
+        let nearest = if is_wide { equal(first) | equal(second) << 4 } else { equal(first) };
+        let child = nearest.trailing_zeros() as usize & 7;
+        self.bounds[child] = GONE;
+        Some(child)
     }
 }
 
-/// The stack of a walk, kept from one walk to the next.
+/// The stack of a walk, and the nodes near the root, which stay from one walk to the next.
 #[derive(Default)]
 pub(crate) struct ProbeStack {
-    levels: Vec<PendingChildren>,
-    /// The file and the first page of the object whose root the first level holds.
+    /// The first one has the root as the only child of its node.
+    levels: Vec<Level>,
+    nodes: Nodes,
+    /// The file and the first page of the object whose nodes these are.
     of: Option<(u64, u32)>,
 }
 
 /// Levels made at once.
 const LEVELS: usize = 16;
+
+/// How many levels of nodes are kept: with four children up to 341 nodes, with eight up to 585.
+#[inline(always)]
+fn kept_levels(parts: usize) -> usize {
+    6 - parts
+}
 
 impl ProbeStack {
     /// Puts the root of an object on an empty stack.
@@ -107,16 +164,73 @@ impl ProbeStack {
         let page = object.record().first_page.get();
         if self.of != Some((bvh.identity(), page)) {
             let slabs = bvh.page(object, page)?.anchor_slabs(0);
-            if self.levels.is_empty() {
-                self.levels.resize(LEVELS, PendingChildren::EMPTY);
-            }
-            let root = &mut self.levels[0];
-            root.groups[0] = spread(isa, &slabs);
-            (root.links, root.page) = (Links { kinds: 1, ..Links::NONE }, page);
+            self.levels.clear();
+            self.nodes.used = 0;
+            self.nodes.add_levels(&mut self.levels);
+            let top = &mut self.nodes.nodes[0];
+            top.groups[0] = spread(isa, &slabs);
+            (top.links, top.page) = (Links { kinds: 1, ..Links::NONE }, page);
+            top.kept = [CLOSED; 8];
             self.of = Some((bvh.identity(), page));
         }
         self.levels[0].bounds[0] = 0.0;
         Ok(())
+    }
+}
+
+/// The nodes of the levels, and those near the root.
+#[derive(Default)]
+struct Nodes {
+    nodes: Vec<OpenedNode>,
+    used: usize,
+}
+
+impl Nodes {
+    /// Makes room for more nodes.
+    #[cold]
+    fn grow(&mut self) {
+        self.nodes.resize(self.used + 4 * LEVELS, OpenedNode::EMPTY);
+    }
+
+    /// Adds some levels to a stack.
+    #[cold]
+    fn add_levels(&mut self, levels: &mut Vec<Level>) {
+        let first = self.used as u32;
+        levels.extend((first..).take(LEVELS).map(|own| Level { bounds: [GONE; 8], node: own, own }));
+        self.used += LEVELS;
+        if self.used >= self.nodes.len() {
+            self.grow();
+        }
+    }
+
+    /// Opens a child of a node. Returns the number of its own node, which is `own` unless it is kept; nothing if it is not
+    /// an inner node.
+    #[inline(always)]
+    fn open<I: Isa>(
+        &mut self,
+        isa: I,
+        of: (&Bvh, &Object),
+        (node, child): (u32, usize),
+        (own, is_kept): (u32, bool),
+    ) -> Result<Option<u32>, QueryError> {
+        let number = if is_kept { self.used as u32 } else { own };
+        let places = [node as usize, number as usize];
+        let Ok([parent, to]) = self.nodes.get_disjoint_mut(places) else { return Ok(None) };
+        let known = parent.kept[child & 7];
+        if known != CLOSED {
+            return Ok(Some(known));
+        }
+        if !to.read(isa, of, parent, child)? {
+            return Ok(None);
+        }
+        if is_kept {
+            parent.kept[child & 7] = number;
+            self.used += 1;
+            if self.used == self.nodes.len() {
+                self.grow();
+            }
+        }
+        Ok(Some(number))
     }
 }
 
@@ -139,13 +253,14 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
         stack.start(isa, bvh, object)?;
         let (parts, max_nodes) = (object.profile().groups(), max_nodes(object));
         let (mut opened, mut depth) = (0, 1);
+        let ProbeStack { levels, nodes, .. } = stack;
         while depth > 0 {
-            if depth == stack.levels.len() {
-                stack.levels.resize(depth + LEVELS, PendingChildren::EMPTY);
+            if depth == levels.len() {
+                nodes.add_levels(levels);
             }
-            let (above, below) = stack.levels.split_at_mut(depth);
+            let (above, below) = levels.split_at_mut(depth);
             let (level, next) = (&mut above[depth - 1], &mut below[0]);
-            let Some(child) = level.take_nearest(parts, visitor.limit()) else {
+            let Some(child) = level.take_nearest(isa, parts, visitor.limit()) else {
                 depth -= 1;
                 continue;
             };
@@ -153,35 +268,30 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
             if opened == max_nodes {
                 return Err(too_many(bvh, object, max_nodes));
             }
-            let from = (&level.groups, &level.links, level.page);
-            let Some(Opened { links, page, .. }) =
-                open_child(isa, (bvh, object), from, child, &mut next.groups)?
-            else {
-                continue;
-            };
-            if bvh.is_worth_prefetching() {
-                for treelets in page.treelets_ahead(&links) {
+            let is_kept = depth <= kept_levels(parts);
+            let at = (level.node, child);
+            let Some(number) = nodes.open(isa, (bvh, object), at, (next.own, is_kept))? else { continue };
+            next.node = number;
+            let node = &nodes.nodes[number as usize];
+            if depth == kept_levels(parts) && bvh.is_worth_prefetching() {
+                for treelets in bvh.page(object, node.page)?.treelets_ahead(&node.links) {
                     prefetch_ahead(isa, treelets);
                 }
             }
-            let page = page.header().page_number.get();
-            (next.links, next.page) = (links, page);
-            let children = links.children().min(4 * parts);
-            let mut inner = 0;
-            let mut leaves = 0u32;
+            let (mut inner, mut leaves) = (0, 0u32);
             for part in 0..parts {
-                let bounds = visitor.bounds(isa, &next.groups[part & 1]);
-                let exist = ((1u32 << children) - 1) >> (4 * part);
+                let bounds = visitor.bounds(isa, &node.groups[part & 1]);
                 let near = bounds.le(isa.splat4(visitor.limit()));
-                let are_leaves = u32::from(leaf_lanes(&links, part));
-                let hidden = isa.load4(&HIDDEN[((are_leaves | !exist) & 0xf) as usize]);
+                let are_inner = node.inner >> (4 * part) & 0xf;
+                let hidden = isa.load4(&HIDDEN[are_inner as usize]);
                 let kept = I::H::select(near, bounds, isa.splat4(GONE)).max(hidden);
                 isa.store4(kept, &mut next.bounds.as_chunks_mut().0[part & 1]);
-                let near = u32::from(I::H::bits(near)) & exist & 0xf;
-                inner |= near & !are_leaves;
-                leaves |= (near & are_leaves) << (4 * part);
+                let near = u32::from(I::H::bits(near) as u8) << (4 * part);
+                inner |= near & u32::from(node.inner);
+                leaves |= near & u32::from(node.leaves);
             }
             budget.charge(1 + u64::from(leaves.count_ones()))?;
+            let (links, page) = (node.links, node.page);
             while leaves != 0 {
                 let (mut near, mut count) = ([LeafPacket { page, packet: 0, triangles: 0 }; 4], 0);
                 while leaves != 0 && count < 4 {

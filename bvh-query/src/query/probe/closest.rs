@@ -189,7 +189,7 @@ impl Task for SearchObject<'_> {
     fn run<I: Isa>(self, isa: I) -> Self::Output {
         let Self { search, placed, index, memory, bounded } = self;
         bounded.clear();
-        let mut visitor = Nearest::new(search, placed, index, bounded);
+        let mut visitor = Nearest::new(isa, search, placed, index, bounded);
         let tests = isa.run(memory.probe_walk(visitor.bvh, visitor.object, &mut visitor))?;
         visitor.settle()?;
         let limit = f64::from(visitor.limit) / (visitor.scale * visitor.stretch);
@@ -223,7 +223,8 @@ struct Nearest<'a> {
 
 impl<'a> Nearest<'a> {
     #[inline(always)]
-    fn new(
+    fn new<I: Isa>(
+        isa: I,
         search: &'a mut Search,
         placed: &'a PlacedShape<'a>,
         index: usize,
@@ -245,7 +246,7 @@ impl<'a> Nearest<'a> {
             scale,
             stretch,
             limit: round_up(search.limit * stretch * scale),
-            test: PointFilter::new(&point, object.profile().directions(), error, scale as f32),
+            test: PointFilter::new(isa, &point, object.profile().directions(), error, scale as f32),
             local: LocalPoint::new(&point, error, scale as f32),
             rooms: [Packet::NONE; 4],
             search,
