@@ -85,11 +85,21 @@ impl ChildLanes {
     /// `children` and `leaves` have a bit for each of four children.
     #[inline(always)]
     fn new(children: u16, leaves: u16) -> Self {
-        // Each bit to the first lane of its row, then to all of them.
-        let rows = |bits: u16| 15 * ((bits | bits << 3 | bits << 6 | bits << 9) & 0x1111);
-        Self { all: [rows(children), 0x1111 * children], leaves: [rows(leaves), 0x1111 * leaves] }
+        let lanes = |bits: u16| [ROWS_OF_LANES[usize::from(bits & 15)], 0x1111 * bits];
+        Self { all: lanes(children), leaves: lanes(leaves) }
     }
 }
+
+/// For the bits of four rows, the bits of the four lanes of each row.
+static ROWS_OF_LANES: [u16; 16] = {
+    let mut lanes = [0; 16];
+    let mut at = 0;
+    while at < 64 {
+        lanes[at / 4] |= ((at / 4 >> (at % 4) & 1) * 0xf << (4 * (at % 4))) as u16;
+        at += 1;
+    }
+    lanes
+};
 
 /// Stands for the number of a node that has not been opened.
 const CLOSED: u32 = u32::MAX;
@@ -145,9 +155,9 @@ pub(super) fn leaf_at(links: &Links, page: u32, child: usize) -> Option<LeafPack
 /// Returns a bit for each of four children, set for leaf packets.
 #[inline(always)]
 pub(super) fn leaf_lanes(links: &Links, part: usize) -> u16 {
-    // Every fourth bit, brought together.
+    // Every fourth bit, brought together: the product has them side by side, from the twelfth on.
     let kinds = links.kinds >> (16 * (part & 1) + 2) & 0x1111;
-    ((kinds | kinds >> 3 | kinds >> 6 | kinds >> 9) & 0xf) as u16
+    (kinds * 0x1248 >> 12 & 0xf) as u16
 }
 
 /// The opened nodes of one side. Node 0 holds the object's root as its only child.
@@ -307,9 +317,9 @@ fn decode_node<I: Isa>(
     }
     to.page = opened.page.header().page_number.get();
     to.count = to.links.children().min(profile.width());
-    for part in 0..2 {
+    for part in 0..profile.groups() {
         let children = (1u16 << to.count.saturating_sub(4 * part).min(4)) - 1;
-        to.lanes[part] = ChildLanes::new(children, leaf_lanes(&to.links, part));
+        to.lanes[part & 1] = ChildLanes::new(children, leaf_lanes(&to.links, part));
     }
     to.opened = [CLOSED; 8];
     to.measure(isa, profile.groups());

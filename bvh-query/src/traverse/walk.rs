@@ -292,9 +292,11 @@ impl PairMemory {
     /// Returns both leaf packets, if the entry is a pair of them.
     #[inline(always)]
     fn leaf_pair(&self, entry: Entry) -> Option<(LeafPacket, LeafPacket)> {
-        let a = self.nodes_a.get(entry.a.node()).leaf(entry.a.child())?;
-        let b = self.nodes_b.get(entry.b.node()).leaf(entry.b.child())?;
-        Some((a, b))
+        let (a, b) = (self.nodes_a.get(entry.a.node()), self.nodes_b.get(entry.b.node()));
+        if !a.is_leaf(entry.a.child()) || !b.is_leaf(entry.b.child()) {
+            return None;
+        }
+        Some((a.leaf(entry.a.child())?, b.leaf(entry.b.child())?))
     }
 }
 
@@ -332,7 +334,10 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 },
             };
             self.budget.visit()?;
-            if let Some(leaves) = self.memory.leaf_pair(next) {
+            // Depth-first, pairs of leaf packets never come on the stack.
+            if W::MAY_BE_BEST_FIRST
+                && let Some(leaves) = self.memory.leaf_pair(next)
+            {
                 if self.visit_leaves(isa, leaves, self.phase() != Phase::DepthFirst)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
