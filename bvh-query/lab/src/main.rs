@@ -8,7 +8,7 @@ mod arguments;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 /// The comparison of answers with the exact oracle, as the tests make it.
-#[path = "../../tests/exact"]
+#[path = "../../tests/answers/exact"]
 #[allow(dead_code, reason = "the search asks about poses, and the tests walk to the boundary")]
 mod exact {
     pub(crate) mod ask;

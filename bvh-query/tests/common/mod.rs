@@ -1,9 +1,8 @@
 //! The code that the tests share: meshes, poses, baked files and the triangles stored in them.
 
-#![allow(dead_code, reason = "every test file uses a part of it")]
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 pub(crate) mod asked;
-pub(crate) mod forged;
 pub(crate) mod nearest;
 pub(crate) mod shapes;
 pub(crate) mod truth;

@@ -12,7 +12,7 @@ fn subtract(p: Point, q: Point) -> Point {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
-fn dot(p: Point, q: Point) -> f64 {
+pub(crate) fn dot(p: Point, q: Point) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 

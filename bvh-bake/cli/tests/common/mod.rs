@@ -1,7 +1,6 @@
 //! Runs the command and makes small meshes.
-#![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
-pub(crate) mod documents;
 pub(crate) mod sheet;
 
 use serde_json::Value;
@@ -79,24 +78,13 @@ pub(crate) fn cbvh_in(directory: &Path, arguments: &[&str]) -> Ended {
         .env_remove("CBVH_ISA"))
 }
 
-/// Runs the command under a hard limit on its address space, in KiB.
-pub(crate) fn cbvh_within(directory: &Path, kibibytes: u64, arguments: &[&str]) -> Ended {
-    let command = "ulimit -v \"$0\" && exec \"$@\"";
-    run(Command::new("sh")
-        .args(["-c", command, &kibibytes.to_string(), env!("CARGO_BIN_EXE_cbvh")])
-        .args(arguments)
-        .current_dir(directory)
-        // Each arena of the GNU C library reserves 64 MiB of addresses, which are no memory.
-        .env("MALLOC_ARENA_MAX", "1")
-        .env_remove("CBVH_ISA"))
-}
-
 /// Runs the command with a forced backend.
 pub(crate) fn cbvh_with_isa(directory: &Path, isa: &str, arguments: &[&str]) -> Ended {
     run(Command::new(env!("CARGO_BIN_EXE_cbvh")).args(arguments).current_dir(directory).env("CBVH_ISA", isa))
 }
 
-fn run(command: &mut Command) -> Ended {
+/// Runs a command to its end.
+pub(crate) fn run(command: &mut Command) -> Ended {
     // Output goes to files, because a full pipe would stop the command.
     let directory = tempfile::tempdir().unwrap();
     let paths = ["out", "err"].map(|name| directory.path().join(name));
@@ -220,6 +208,9 @@ pub(crate) fn poses(count: usize, from: f64, to: f64) -> String {
     }
     text
 }
+
+/// The folder of small meshes and frozen files.
+pub(crate) const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
 /// Returns a folder of test material beside the repository, if it exists.
 pub(crate) fn shared(name: &str) -> Option<PathBuf> {

@@ -1,0 +1,196 @@
+//! Reads malformed files: a folder of them, random bytes and damaged files.
+
+use super::clouds::{pcd, ply_of_points};
+use super::gltf::{INDEXED, glb, gltf};
+use super::{CORNERS, TWO, binary_stl, one_line, ply, try_bytes};
+use bvh_bake::input::{MeshFormat, read};
+use cbvh_testkit::depth::rounds;
+use proptest::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// For each file, the number of triangles if it can be read, or else a part of the error message.
+const HARD: &[(&str, Result<u64, &str>)] = &[
+    ("assimp__3DSMaxExport.STL", Ok(2000)),
+    ("assimp__Spider_ascii.stl", Ok(1368)),
+    ("assimp__OutOfMemory.off", Err("an unsupported format, .off")),
+    ("assimp__box_longline.obj", Ok(944)),
+    ("assimp__concave_polygon.obj", Ok(64)),
+    ("assimp__cube_binary_header_with_RN_newline.ply", Ok(12)),
+    ("assimp__cube_binary_starts_with_nl.ply", Ok(12)),
+    ("assimp__cube_uv.ply", Ok(12)),
+    ("assimp__crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply", Err("line 7: expected property")),
+    ("assimp__empty.obj", Err("expected at least one face, found none")),
+    ("assimp__issue623.ply", Err("line 13: expected an element vertex")),
+    ("assimp__malformed.obj", Err("line 23: expected a vertex number from 1 to 8, found 12")),
+    ("assimp__number_formats.obj", Err("line 11: expected three numbers after v, found 3.1+e2")),
+    ("assimp__testline.obj", Err("expected at least one face, found none")),
+    ("assimp__testmixed.obj", Ok(12)),
+    ("assimp__triangle_with_two_solids.stl", Ok(2)),
+    ("syn_ascii.stl", Ok(1)),
+    ("syn_ascii_trunc.stl", Err("line 5: expected a number, found the end of the file")),
+    ("syn_be.ply", Ok(1)),
+    ("syn_bin_count_high.stl", Err("byte 80: expected a count of at most 2 triangles")),
+    ("syn_bin_nan.stl", Err("byte 196: expected a finite coordinate")),
+    ("syn_bin_solid_header.stl", Ok(2)),
+    ("syn_bin_trunc.stl", Err("byte 80: ")),
+    ("syn_bom.obj", Ok(1)),
+    ("syn_comma.obj", Err("line 1: expected three numbers after v, found 0,5")),
+    ("syn_continuation.obj", Ok(1)),
+    ("syn_cr.obj", Ok(1)),
+    ("syn_hexfloat.obj", Err("line 1: expected three numbers after v, found 0x1p0")),
+    ("syn_huge_coords.obj", Err("line 1: expected a finite coordinate")),
+    ("syn_index_big.obj", Err("line 4: expected a vertex number from 1 to 3, found 4")),
+    ("syn_index_forward.obj", Ok(1)),
+    (
+        "syn_index_neg_big.obj",
+        Err("line 4: expected a number that counts back over at most 3 vertices, found -4"),
+    ),
+    ("syn_long_name.obj", Ok(1)),
+    ("syn_nan.obj", Err("line 4: expected a finite coordinate")),
+    ("syn_nan_unused.obj", Ok(1)),
+    ("syn_neg_ok.obj", Ok(2)),
+    ("syn_negidx.ply", Err("byte 214: expected a vertex number from 0 to 2, found -1")),
+    ("syn_ngon255.ply", Ok(85)),
+    ("syn_nofaces.obj", Err("expected at least one face, found none")),
+    ("syn_nonl.obj", Ok(1)),
+    ("syn_nul.obj", Ok(1)),
+    ("syn_overflow.obj", Err("line 4: expected a finite coordinate")),
+    ("syn_quads.obj", Ok(2048)),
+    ("syn_same_tri_100k.obj", Ok(100_000)),
+    ("syn_short.stl", Err("line 1: expected facet or endsolid, found the end of the file")),
+    ("syn_slashes.obj", Ok(5)),
+    ("syn_trunc.ply", Err("byte 206: expected a number, found the end of the file")),
+    ("syn_v2.obj", Err("line 1: expected three numbers after v, found 2")),
+    ("syn_zero_area_line.obj", Ok(2)),
+    ("tinyobjloader__invalid-relative-vertex-index.obj", Err("line 1: ")),
+    (
+        "tinyobjloader__issue-140-zero-face-idx.obj",
+        Err("line 16: expected a vertex number from 1 to 4, found 0/0/0"),
+    ),
+    ("tinyobjloader__issue-161-inconsistent-f.obj", Ok(12)),
+    ("tinyobjloader__test-nan.obj", Err("line 14: ")),
+    ("tobj__invalid_index.obj", Err("line 12: expected a vertex number from 1 to 6, found 7")),
+    ("trimesh__empty.ply", Err("expected at least one triangle, found none")),
+    ("trimesh__multibody.stl", Ok(32)),
+    ("trimesh__nancolor.obj", Ok(12)),
+    ("trimesh__negative_indices.obj", Ok(12)),
+    ("trimesh__polygonfaces.obj", Ok(3)),
+    ("trimesh__stl_empty_bin.stl", Err("expected at least one triangle, found none")),
+    ("trimesh__two_objects_mixed_case_names.stl", Ok(24)),
+];
+
+#[test]
+fn hard_files_are_read_or_refused_as_expected() {
+    let Some(files) = hard_files() else { return };
+    for path in files {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let result = read(&path);
+        let expected = HARD.iter().find(|(file, _)| *file == name).map(|(_, expected)| *expected);
+        match (&result, expected) {
+            (Ok(mesh), Some(Ok(triangles))) => assert_eq!(mesh.triangle_count(), triangles, "{name}"),
+            (Err(error), Some(Err(part))) => assert!(error.to_string().contains(part), "{name}: {error}"),
+            (_, Some(_)) => panic!("{name}: {:?}", result.map(|mesh| mesh.triangle_count())),
+            (_, None) => {}
+        }
+        match result {
+            Ok(mesh) => assert_eq!(mesh.check(), Ok(()), "{name}"),
+            Err(error) => drop(one_line(&error)),
+        }
+    }
+}
+
+#[allow(clippy::print_stderr, reason = "a test that was skipped should say so")]
+fn hard_files() -> Option<Vec<PathBuf>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/hard");
+    match fs::read_dir(&folder) {
+        Ok(entries) => Some(entries.map(|entry| entry.unwrap().path()).collect()),
+        Err(_) => {
+            eprintln!("skipped: there is no {}", folder.display());
+            None
+        }
+    }
+}
+
+fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
+    let text = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+    let sparse = r#"{"attributes":{"POSITION":2},"indices":0}"#;
+    vec![
+        (
+            MeshFormat::Obj,
+            format!("o a\n{CORNERS}f 1/1 2// 3 -1\n\\\nv 0 0 \\\n 1e3\ng b\nf 1 2 3 4 5\n").into_bytes(),
+        ),
+        (MeshFormat::Stl, text.into()),
+        (MeshFormat::Stl, binary_stl(b"solid", 2, &TWO)),
+        (MeshFormat::Ply, ply("ascii")),
+        (MeshFormat::Ply, ply("binary_little_endian")),
+        (MeshFormat::Ply, ply("binary_big_endian")),
+        (MeshFormat::Ply, ply_of_points("ascii")),
+        (MeshFormat::Xyz, b"# points\n0 1 2, 7\n1e3;-.5;3\n".to_vec()),
+        (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], "ascii")),
+        (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], "binary")),
+        (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0]; 9], "binary_compressed")),
+        (MeshFormat::Gltf, glb(&gltf(r#"{"children":[1]},{"mesh":0}"#, sparse, ""))),
+        (MeshFormat::Gltf, gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"data:;base64,AgEAAAAA""#).into_bytes()),
+    ]
+}
+
+const FORMATS: [MeshFormat; 6] =
+    [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply, MeshFormat::Gltf, MeshFormat::Xyz, MeshFormat::Pcd];
+
+/// Asserts what must hold for any bytes.
+fn survives(bytes: &[u8], format: MeshFormat) {
+    MeshFormat::from_content(bytes);
+    match try_bytes(bytes, format) {
+        Ok(mesh) => assert_eq!(mesh.check(), Ok(())),
+        Err(error) => drop(one_line(&error)),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: rounds(200) as u32, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        FORMATS.iter().for_each(|&format| survives(&bytes, format));
+    }
+
+    #[test]
+    fn statements_at_random_never_panic(text in "([vfog] |[-0-9./ ]{1,9}|nan|1e999|[\\\\\n\r#]){0,60}") {
+        survives(text.as_bytes(), MeshFormat::Obj);
+    }
+
+    #[test]
+    fn mutated_files_never_panic(
+        seed in 0usize..8,
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
+    ) {
+        let (format, mut bytes) = seeds().swap_remove(seed);
+        for (at, value, kind) in edits {
+            if bytes.is_empty() {
+                break;
+            }
+            let place = at.index(bytes.len());
+            match kind {
+                0 => bytes[place] = value,
+                1 => bytes[place] ^= 1 << (value % 8),
+                2 => drop(bytes.remove(place)),
+                _ => bytes.truncate(place),
+            }
+        }
+        survives(&bytes, format);
+    }
+
+    #[test]
+    fn digits_changed_in_a_document_never_panic(
+        seed in 6usize..8,
+        edits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 1..5),
+    ) {
+        let (format, mut bytes) = seeds().swap_remove(seed);
+        let digits: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at].is_ascii_digit()).collect();
+        for (at, digit) in edits {
+            bytes[digits[at.index(digits.len())]] = digit;
+        }
+        survives(&bytes, format);
+    }
+}

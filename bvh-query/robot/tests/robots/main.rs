@@ -1,0 +1,6 @@
+//! Robots: where their links stand, what they answer, and what is refused.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod kinematics;
+mod misuse;
+mod questions;

@@ -1,0 +1,269 @@
+//! Answers about robots against the same questions to a scene, pair by pair, and against many samples of motions.
+
+use bvh_bake::{Options, shapes, to_bytes};
+use bvh_query::{Bvh, MotionOptions, OwnedShape, Pose, Querier};
+use cbvh_robot::{Base, Edge, Robot, RobotMotion, RobotOptions};
+use cbvh_testkit::Random;
+use std::path::Path;
+
+fn arm(base: Base) -> Robot {
+    let mut robot = arm_with_all_pairs(base);
+    for (a, b) in [("base", "turret"), ("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "hand")]
+    {
+        robot.allow(a, b).unwrap();
+    }
+    robot
+}
+
+fn arm_with_all_pairs(base: Base) -> Robot {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/robot/robot.urdf");
+    Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
+}
+
+fn block(sides: [f64; 3]) -> OwnedShape {
+    let (bytes, _) = to_bytes(&shapes::block(sides).unwrap(), &Options::default()).unwrap();
+    OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).solid().unwrap()
+}
+
+fn at(translation: [f64; 3]) -> Pose {
+    Pose::new(*Pose::IDENTITY.rotation(), translation).unwrap()
+}
+
+/// The arm among obstacles, with something in its hand.
+fn cell(base: Base) -> Robot {
+    let mut robot = arm(base);
+    robot.add_obstacle("pillar", block([0.1, 0.1, 1.5]), &at([0.45, 0.0, 0.75])).unwrap();
+    robot.add_obstacle("shelf", block([0.4, 1.0, 0.02]), &at([-0.5, 0.0, 0.9])).unwrap();
+    robot.attach("tool", block([0.02, 0.02, 0.2]), "hand", &at([0.0, 0.0, 0.2]), &["forearm"]).unwrap();
+    robot
+}
+
+fn random_values(random: &mut Random, robot: &Robot) -> Vec<f64> {
+    let value = |[lower, upper]: &[f64; 2]| match lower.is_finite() {
+        true => lower + (upper - lower) * random.unit(),
+        false => 0.3 * random.signed(),
+    };
+    robot.limits().iter().map(value).collect()
+}
+
+#[test]
+fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
+    let mut robot = cell(Base::Fixed);
+    let random = &mut Random::new(1);
+    let mut querier = Querier::new().unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/robot");
+    // The shapes of the file, by hand.
+    let mesh = |name: &str, scale: [f64; 3]| -> OwnedShape {
+        let mut mesh = bvh_bake::input::read(&folder.join(name)).unwrap();
+        let object = &mut mesh.objects[0];
+        object.positions.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| p[k] * scale[k]));
+        Bvh::from_bytes(to_bytes(&mesh, &Options::default()).unwrap().0).unwrap().into()
+    };
+    let up = Pose::from_quaternion([0.0, 0.5f64.sqrt(), 0.0, 0.5f64.sqrt()], [0.0, 0.0, 0.07]).unwrap();
+    let bodies = [
+        ("base", "base", mesh("base.obj", [1.0; 3]), Pose::IDENTITY),
+        ("turret", "turret", mesh("link.obj", [0.5, 0.5, 0.3]), up),
+        ("upper_arm", "upper_arm", mesh("link.obj", [1.0; 3]), Pose::IDENTITY),
+        ("forearm", "forearm", mesh("link.obj", [0.8; 3]), Pose::IDENTITY),
+        ("hand", "hand", mesh("hand.obj", [0.001; 3]), Pose::IDENTITY),
+        ("pillar", "", block([0.1, 0.1, 1.5]), at([0.45, 0.0, 0.75])),
+        ("shelf", "", block([0.4, 1.0, 0.02]), at([-0.5, 0.0, 0.9])),
+        ("tool", "hand", block([0.02, 0.02, 0.2]), at([0.0, 0.0, 0.2])),
+    ];
+    let links: Vec<String> = robot.links().map(str::to_owned).collect();
+    let pairs = robot.pairs();
+    assert_eq!(pairs.len(), 6 + 10 + 3 + 2);
+    let (mut rows, mut hits) = (Vec::new(), 0);
+    let mut answers = Vec::new();
+    for _ in 0..200 {
+        let q = random_values(random, &robot);
+        let poses = robot.link_poses(&q).unwrap();
+        let place = |name: &str| {
+            let (_, link, shape, pose) = bodies.iter().find(|body| body.0 == name).unwrap();
+            let world = links.iter().position(|of| of == link).map_or(Pose::IDENTITY, |place| poses[place]);
+            (shape.clone(), pose.then(&world).unwrap())
+        };
+        let (mut expected, mut least) = (Vec::new(), f64::INFINITY);
+        for pair in &pairs {
+            let [(a, of_a), (b, of_b)] = [place(&pair[0]), place(&pair[1])];
+            let pose = Pose::relative(&of_a, &of_b).unwrap();
+            if querier.collide(&a, &b, &pose).unwrap() {
+                expected.push(pair.clone());
+            }
+            least = least.min(querier.distance(&a, &b, &pose).unwrap().distance);
+        }
+        hits += usize::from(!expected.is_empty());
+        assert_eq!(robot.pairs_in_contact(&q).unwrap(), expected);
+        assert_eq!(robot.collide(&q).unwrap(), !expected.is_empty());
+        let nearest = robot.distance(&q).unwrap().unwrap();
+        assert!((nearest.nearest.distance - least).abs() < 1e-12);
+        let way: f64 = (0..3).map(|k| (nearest.points[0][k] - nearest.points[1][k]).powi(2)).sum();
+        assert!((way.sqrt() - least).abs() < 1e-9);
+        answers.push((expected, nearest));
+        rows.extend(q);
+    }
+    assert!((20..180).contains(&hits), "{hits}");
+    // Many at once, on any number of threads.
+    for threads in [1, 3] {
+        let pool = cbvh_testkit::pool(threads);
+        let touching = pool.install(|| robot.pairs_in_contact_many(&rows)).unwrap();
+        assert!(touching.iter().eq(answers.iter().map(|(expected, _)| expected)));
+        let nearest = pool.install(|| robot.distance_many(&rows)).unwrap();
+        assert!(nearest.iter().flatten().eq(answers.iter().map(|(_, nearest)| nearest)));
+        let colliding = pool.install(|| robot.collide_many(&rows)).unwrap();
+        assert!(
+            colliding.iter().eq(answers
+                .iter()
+                .map(|(expected, _)| !expected.is_empty())
+                .collect::<Vec<_>>()
+                .iter())
+        );
+    }
+}
+
+/// No sample of a free motion touches, and every hit is one.
+#[test]
+fn free_motions_are_free_at_all_samples() {
+    for (base, seed) in [(Base::Fixed, 2), (Base::Planar, 3), (Base::Floating, 4)] {
+        let mut robot = cell(base);
+        let random = &mut Random::new(seed);
+        let (mut free, mut hit) = (0, 0);
+        for _ in 0..40 {
+            let [mut from, mut to] = [(); 2].map(|()| random_values(random, &robot));
+            if base == Base::Floating {
+                from[3..7].copy_from_slice(&random.quaternion());
+                to[3..7].copy_from_slice(&random.quaternion());
+            }
+            // Short ones as well.
+            let share = if hit > free { 0.1 } else { 1.0 };
+            to = from.iter().zip(&to).map(|(from, to)| from + share * (to - from)).collect();
+            let edge = Edge::straight(&from, &to).unwrap();
+            let is_free = robot.is_free(&from, &to).unwrap();
+            let samples = if base == Base::Floating { 0 } else { 500 };
+            for step in 0..samples {
+                let t = f64::from(step) / 500.0;
+                let q: Vec<f64> = from.iter().zip(&to).map(|(from, to)| from + t * (to - from)).collect();
+                assert!(!is_free || !robot.collide(&q).unwrap());
+            }
+            match robot.motion(&edge, &MotionOptions::new()).unwrap() {
+                RobotMotion::Free => assert!(is_free),
+                RobotMotion::Hit { free_until, touching_at, joints, bodies, nearest, points } => {
+                    assert!(!is_free && free_until <= touching_at);
+                    assert!(robot.pairs_in_contact(&joints).unwrap().contains(&bodies));
+                    let way: f64 = (0..3).map(|k| (points[0][k] - points[1][k]).powi(2)).sum();
+                    assert!((way.sqrt() - nearest.distance).abs() < 1e-9);
+                    for step in 0..if free_until > 0.0 { 50 } else { 0 } {
+                        let t = free_until * f64::from(step) / 50.0;
+                        let q: Vec<f64> =
+                            from.iter().zip(&to).map(|(from, to)| from + t * (to - from)).collect();
+                        assert!(samples == 0 || !robot.collide(&q).unwrap());
+                    }
+                }
+                other => panic!("{other:?}"),
+            }
+            (free, hit) = (free + u32::from(is_free), hit + u32::from(!is_free));
+        }
+        assert!(free >= 8 && hit >= 8, "{base:?}: {free} free, {hit} hit");
+    }
+}
+
+/// A thin plate that only touches between samples: a discrete check misses it, a certain one does not.
+#[test]
+fn what_is_between_samples_is_found() {
+    let mut robot = arm(Base::Fixed);
+    robot.add_obstacle("sheet", block([0.6, 1e-6, 0.6]), &at([0.3, 0.00213, 0.8])).unwrap();
+    let (from, to) = ([-0.5, 1.2, 0.0, 0.0], [0.5, 1.2, 0.0, 0.0]);
+    assert!(!robot.is_free(&from, &to).unwrap());
+    let found = robot.first_hit([&from[..], &to[..], &from[..]], &MotionOptions::new()).unwrap();
+    assert!(matches!(found, Some((0, RobotMotion::Hit { ref bodies, .. })) if bodies[1] == "sheet"));
+    robot.remove("sheet").unwrap();
+    assert!(robot.is_free(&from, &to).unwrap());
+    assert_eq!(robot.first_hit([&from[..], &to[..], &from[..]], &MotionOptions::new()).unwrap(), None);
+}
+
+/// Base and turret slide along each other less than the tolerance apart, so that each of their moments is undecided. None of them
+/// matters, since turret and upper arm touch from the start.
+#[test]
+fn a_hit_at_the_start_ends_the_search() {
+    let mut robot = arm_with_all_pairs(Base::Fixed);
+    let edge = Edge::straight(&[0.0; 4], &[3.0, 2.0, 2.5, 1.0]).unwrap();
+    let found = robot.motion(&edge, &MotionOptions::new()).unwrap();
+    let RobotMotion::Hit { free_until, touching_at, bodies, .. } = found else { panic!("{found:?}") };
+    assert_eq!((free_until, touching_at, bodies), (0.0, 0.0, ["turret", "upper_arm"].map(str::to_string)));
+}
+
+/// Binomials of a thousand are beyond all numbers of `f64`, and no bound may be lost with them.
+#[test]
+fn a_polynomial_of_many_coefficients_is_as_certain() {
+    let mut robot = arm(Base::Fixed);
+    robot.add_obstacle("pillar", block([0.1, 0.1, 1.5]), &at([0.45, 0.0, 0.75])).unwrap();
+    for count in [2, 32, 33, 1100] {
+        // The waist turns past the pillar, the later and the faster the more coefficients there are.
+        let mut waist = vec![0.0; count];
+        (waist[0], waist[count - 1]) = (-1.0, 2.0);
+        let edge = Edge::polynomials(vec![waist, vec![1.2], vec![0.0], vec![0.0]]);
+        assert!(!robot.is_edge_free(&edge, &MotionOptions::new()).unwrap(), "{count}");
+        let found = robot.motions(&[edge], &MotionOptions::new()).unwrap();
+        assert!(matches!(found[0], RobotMotion::Hit { .. }), "{count}: {found:?}");
+    }
+}
+
+#[test]
+fn a_radius_makes_up_for_no_negative_margin() {
+    let mut robot = arm(Base::Fixed);
+    robot.add_obstacle("ball", block([0.1; 3]).rounded(0.5).unwrap(), &at([2.0, 0.0, 0.0])).unwrap();
+    assert!(robot.set_margin("ball", -0.25).is_err());
+    robot.set_margin("ball", 0.25).unwrap();
+}
+
+#[test]
+fn bodies_keep_their_numbers() {
+    let mut robot = arm(Base::Fixed);
+    let links: Vec<String> = robot.links().map(str::to_owned).collect();
+    assert!(links.iter().enumerate().all(|(k, link)| robot.body(link).unwrap() == k));
+    robot.add_obstacle("one", block([0.1; 3]), &at([2.0, 0.0, 0.0])).unwrap();
+    let one = robot.body("one").unwrap();
+    assert_eq!(robot.body_name(one), Some("one"));
+    robot.attach("two", block([0.1; 3]), "hand", &at([0.0, 0.0, 0.5]), &[]).unwrap();
+    robot.set_margin("two", 0.25).unwrap();
+    for (name, place, radius) in [("one", [2.0, 0.0, 0.0], 0.0), ("two", [0.0, 0.0, 0.5], 0.25)] {
+        let shapes = robot.shapes(robot.body(name).unwrap()).unwrap();
+        assert_eq!((shapes.len(), shapes[0].0.shape().radius(), shapes[0].1), (1, radius, at(place)));
+    }
+    assert_eq!(robot.shapes(1).unwrap()[0].1.translation(), [0.0, 0.0, 0.07]);
+    assert!(robot.shapes(99).unwrap().is_empty());
+    robot.remove("one").unwrap();
+    robot.add_obstacle("one", block([0.1; 3]), &at([2.0, 0.0, 0.0])).unwrap();
+    assert!(robot.body("one").unwrap() != one && robot.body_name(one).is_none());
+    assert_eq!(robot.body_name(99), None);
+}
+
+#[test]
+fn margins_allowances_and_changes_count() {
+    let mut robot = arm(Base::Fixed);
+    let still = [0.0; 4];
+    for [a, b] in robot.pairs() {
+        robot.allow(&a, &b).unwrap();
+    }
+    assert_eq!(robot.distance(&still).unwrap(), None);
+    robot.add_obstacle("wall", block([0.1, 1.0, 2.0]), &at([0.3, 0.0, 1.0])).unwrap();
+    let near = robot.distance(&still).unwrap().unwrap();
+    assert!(near.bodies[1] == "wall" && near.nearest.distance > 0.0);
+    robot.set_margin("wall", near.nearest.distance * 0.999).unwrap();
+    assert!(!robot.collide(&still).unwrap());
+    robot.set_margin("wall", near.nearest.distance * 1.001).unwrap();
+    assert!(robot.collide(&still).unwrap());
+    let touching = robot.pairs_in_contact(&still).unwrap();
+    for [a, b] in &touching {
+        robot.allow(a, b).unwrap();
+    }
+    assert!(!robot.collide(&still).unwrap());
+    let before = robot.clone();
+    robot.set_margin("wall", 0.0).unwrap();
+    robot.set_pose("wall", &at([0.05, 0.0, 1.0])).unwrap();
+    assert!(robot.collide(&still).unwrap() && !before.clone().collide(&still).unwrap());
+    robot.remove("wall").unwrap();
+    assert!(!robot.collide(&still).unwrap());
+    let frequent = robot.allow_frequent(50, 0.5).unwrap();
+    assert!(frequent.iter().all(|(_, share)| *share >= 0.5));
+}
