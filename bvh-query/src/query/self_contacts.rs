@@ -58,10 +58,18 @@ impl Querier {
     pub fn visit_self_contacts<'a>(
         &mut self,
         shape: impl Into<Shape<'a>>,
-        visit: impl FnMut(SelfContact) -> ControlFlow<()>,
+        mut visit: impl FnMut(SelfContact) -> ControlFlow<()>,
     ) -> Result<u64, QueryError> {
         self.start();
-        let shape = shape.into();
+        self.each_self_contact(shape.into(), &mut visit)
+    }
+
+    /// Does the work of `visit_self_contacts`, and is compiled with this crate, not again with each that calls it.
+    fn each_self_contact(
+        &mut self,
+        shape: Shape<'_>,
+        visit: &mut dyn FnMut(SelfContact) -> ControlFlow<()>,
+    ) -> Result<u64, QueryError> {
         let triangles = max_triangles(shape);
         let mut reports = Reports { shape, visit, calls: 0, most: triangles.saturating_mul(triangles) / 2 };
         let (budget, frames) = (&mut self.memory.budget, &frames(shape));
@@ -280,15 +288,15 @@ impl ExactPairs<'_> {
 }
 
 /// What has been reported.
-struct Reports<'a, V> {
+struct Reports<'a> {
     shape: Shape<'a>,
-    visit: V,
+    visit: &'a mut dyn FnMut(SelfContact) -> ControlFlow<()>,
     calls: u64,
     /// There are no more pairs of triangles than this. In a forged file, any number of triangles may have the same id.
     most: u64,
 }
 
-impl<V: FnMut(SelfContact) -> ControlFlow<()>> Reports<'_, V> {
+impl Reports<'_> {
     /// Reports a pair of triangles, each with the number of its object and its id.
     fn report(
         &mut self,
