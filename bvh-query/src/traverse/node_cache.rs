@@ -93,9 +93,10 @@ impl ChildLanes {
 /// For the bits of four rows, the bits of the four lanes of each row.
 static ROWS_OF_LANES: [u16; 16] = {
     let mut lanes = [0; 16];
-    let mut at = 0;
+    let mut at: usize = 0;
     while at < 64 {
-        lanes[at / 4] |= ((at / 4 >> (at % 4) & 1) * 0xf << (4 * (at % 4))) as u16;
+        let bit = (((at / 4) >> (at % 4)) & 1) as u16;
+        lanes[at / 4] |= (bit * 0xf) << (4 * (at % 4));
         at += 1;
     }
     lanes
@@ -157,7 +158,7 @@ pub(super) fn leaf_at(links: &Links, page: u32, child: usize) -> Option<LeafPack
 pub(super) fn leaf_lanes(links: &Links, part: usize) -> u16 {
     // Every fourth bit, brought together: the product has them side by side, from the twelfth on.
     let kinds = links.kinds >> (16 * (part & 1) + 2) & 0x1111;
-    (kinds * 0x1248 >> 12 & 0xf) as u16
+    ((kinds * 0x1248) >> 12 & 0xf) as u16
 }
 
 /// The opened nodes of one side. Node 0 holds the object's root as its only child.
