@@ -924,8 +924,8 @@ cbvh_status cbvh_scene_set_parallel(cbvh_scene scene, int32_t parallel);
  * little between questions. */
 cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
 /* Limits each question to this many visits over all its pairs, and each probe over all instances. Visits are those of
- * cbvh_querier_set_budget, and each pair of boxes that the search for near pairs tests. If there are several threads,
- * each may make this many before they stop. */
+ * cbvh_querier_set_budget, each comparison of a box with up to sixteen others in the search for near pairs, and each pair
+ * of boxes that these leave. If there are several threads, each may make this many before they stop. */
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
 
 /* Adds a mesh at a pose in the world. The rotation must be rigid to within 2^-23, and the translation at most 2^118

@@ -55,8 +55,8 @@ use workers::Workers;
 /// A question first finds near pairs and then tests them, at most 65,536 at a time plus those of one more instance.
 /// Memory therefore grows with the number of instances and not with the number of pairs.
 ///
-/// Cost: moving an instance takes some 0.2 us. A question with nothing near takes some 2 us if 8 of 100 instances move
-/// (AMD EPYC, family 26). A question reads the object table of each file, and pages only of instances that are near
+/// Cost: moving an instance takes some 0.2 us. A question with nothing near takes some 1.7 us if 8 of 100 instances move
+/// (AMD EPYC, family 25). A question reads the object table of each file, and pages only of instances that are near
 /// another one.
 ///
 /// # Threads
@@ -237,8 +237,9 @@ impl Scene {
     /// all instances. Without a budget, only the number of instances and the sizes of the files limit a question.
     ///
     /// Two kinds of visits count: those of [`Querier::set_budget`](crate::Querier::set_budget) for each pair tested,
-    /// and those of the broad phase. The latter are the pairs of boxes, or for a probe the boxes, that the search for
-    /// near ones tests. So both time and memory are limited, however many instances a file puts in one place.
+    /// and those of the broad phase. The latter are the comparisons of a box with up to sixteen others at once, and the pairs
+    /// of boxes that these leave; for a probe the boxes that the search for near ones tests. So both time and memory are
+    /// limited, however many instances a file puts in one place.
     ///
     /// If the visits run out, the error is [`SceneError::Pair`] or [`SceneError::Instance`] with
     /// [`QueryError::Budget`](crate::QueryError::Budget), or [`SceneError::Query`] with it in the broad phase. If the

@@ -448,7 +448,8 @@ impl Scene {
         let places = self.contents.instances.len() as u32;
         self.charged(|budget| {
             if matches!(next, Next::All) {
-                let all = self.contents.broad.pairs(limit, budget, |x, y, squared_gap| {
+                let backend = self.workers.backend();
+                let all = self.contents.broad.pairs(backend, limit, budget, |x, y, squared_gap| {
                     if near_pairs.len() == MAX_KNOWN_PAIRS {
                         return ControlFlow::Break(());
                     }

@@ -60,6 +60,10 @@ impl Workers {
         *self = Self { idle, ..source.clone() };
     }
 
+    pub(super) fn backend(&self) -> Backend {
+        self.backend
+    }
+
     /// Returns the number of threads that questions use.
     pub(super) fn threads(&self) -> usize {
         #[cfg(feature = "parallel")]

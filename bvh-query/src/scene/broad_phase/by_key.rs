@@ -1,5 +1,6 @@
 //! The instances in the order of a key of their boxes, such as the distance from a point.
 
+use super::tree::Child;
 use super::{BroadPhase, Which};
 use crate::error::QueryError;
 use crate::scene::world_box::WorldBox;
@@ -12,20 +13,18 @@ pub(in crate::scene) struct ByKey<K> {
     open: BinaryHeap<Keyed>,
 }
 
-/// A node and its key.
+/// A part of a tree and its key.
 #[derive(Clone, Copy, Debug)]
 struct Keyed {
     key: f64,
+    part: Child,
     tree: Which,
-    node: u32,
-    /// The place of a leaf; 0 for an inner node.
-    place: u32,
 }
 
 impl Ord for Keyed {
-    /// The greatest has the least key; of equal keys, inner nodes come first and then the lowest place.
+    /// The greatest has the least key; of equal keys, nodes come first and then the lowest place.
     fn cmp(&self, other: &Self) -> Ordering {
-        let rest = |of: &Self| (of.place, of.tree, of.node);
+        let rest = |of: &Self| (of.part, of.tree);
         other.key.total_cmp(&self.key).then_with(|| rest(other).cmp(&rest(self)))
     }
 }
@@ -48,20 +47,19 @@ impl<K: Fn(&WorldBox) -> f64> ByKey<K> {
     pub(super) fn new(broad: &BroadPhase, key: K) -> Self {
         let mut order = Self { key, open: BinaryHeap::new() };
         for which in [Which::Still, Which::Moving] {
-            if !broad.tree(which).nodes.is_empty() {
-                order.push(broad, which, 0);
+            if let Some(whole) = broad.tree(which).whole() {
+                order.push(broad, which, whole.child);
             }
         }
         order
     }
 
-    fn push(&mut self, broad: &BroadPhase, tree: Which, number: u32) {
-        let node = &broad.tree(tree).nodes[number as usize];
-        let key = (self.key)(&node.bounds);
+    fn push(&mut self, broad: &BroadPhase, tree: Which, part: Child) {
+        let bounds = broad.tree(tree).bounds(part);
+        let key = (self.key)(&bounds);
         // What has moved left an empty box in the tree of what stands still.
-        if key < f64::INFINITY && !node.bounds.is_empty() {
-            let place = if node.is_leaf() { node.children[1] } else { 0 };
-            self.open.push(Keyed { key, tree, node: number, place });
+        if key < f64::INFINITY && !bounds.is_empty() {
+            self.open.push(Keyed { key, part, tree });
         }
     }
 
@@ -71,13 +69,14 @@ impl<K: Fn(&WorldBox) -> f64> ByKey<K> {
         broad: &BroadPhase,
         mut charge: impl FnMut() -> Result<(), QueryError>,
     ) -> Result<Option<(u32, f64)>, QueryError> {
-        while let Some(Keyed { key, tree, node, place }) = self.open.pop() {
+        while let Some(Keyed { key, part, tree }) = self.open.pop() {
             charge()?;
-            let node = &broad.tree(tree).nodes[node as usize];
-            if node.is_leaf() {
-                return Ok(Some((place, key)));
+            match part {
+                Child::Place(place) => return Ok(Some((place, key))),
+                Child::Node(node) => {
+                    broad.tree(tree).parts(node).for_each(|part| self.push(broad, tree, part.child));
+                }
             }
-            node.children.into_iter().for_each(|child| self.push(broad, tree, child));
         }
         Ok(None)
     }

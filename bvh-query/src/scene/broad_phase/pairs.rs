@@ -1,69 +1,110 @@
 //! The pairs of instances that are near each other: all within a distance, or one after another, the nearest first.
 
-use super::tree::Tree;
+use super::tree::{Child, Part, Tree, squared_limit};
 use super::{BroadPhase, Which};
 use crate::error::QueryError;
+use crate::isa::{Isa, Task};
 use crate::traverse::budget::Budget;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
-/// A search for the nearest boxes is given up when more pairs than this wait: 2.5 MiB.
+/// A search for the nearest boxes is given up when more pairs than this wait: 2 MiB.
 const MAX_OPEN_PAIRS: usize = 1 << 16;
 
-/// Visits the near pairs of two trees, or of one tree with itself, until `visit` breaks. `open` is empty at first.
-pub(super) fn near_pairs(
-    (a, b): (&Tree, &Tree),
-    limit: f64,
-    budget: &mut Budget,
-    open: &mut Vec<(u32, u32)>,
-    visit: &mut impl FnMut(u32, u32, f64) -> ControlFlow<()>,
-) -> Result<ControlFlow<()>, QueryError> {
-    if a.nodes.is_empty() || b.nodes.is_empty() {
-        return Ok(ControlFlow::Continue(()));
+/// A search for the near pairs of two trees, or of one tree with itself. `V` takes the places of a pair and the square of its
+/// gap, and breaks where no more are wanted.
+pub(super) struct NearPairs<'a, V> {
+    trees: [&'a Tree; 2],
+    /// The square of how far apart boxes may be, exactly and as nodes are tested.
+    limits: (f64, f32),
+    budget: &'a mut Budget,
+    visit: &'a mut V,
+    open: Vec<Facing>,
+}
+
+/// A part of one tree, to be compared with the children of a node of the other tree.
+#[derive(Clone, Copy)]
+struct Facing {
+    part: Part,
+    node: u32,
+    /// Whether the part is of the second tree.
+    is_swapped: bool,
+}
+
+impl<'a, V: FnMut(u32, u32, f64) -> ControlFlow<()>> NearPairs<'a, V> {
+    pub(super) fn new(trees: [&'a Tree; 2], limit: f64, budget: &'a mut Budget, visit: &'a mut V) -> Self {
+        let squared = limit * limit;
+        Self { trees, limits: (squared, squared_limit(squared)), budget, visit, open: Vec::new() }
     }
-    let is_one = std::ptr::eq(a, b);
-    let squared_limit = limit * limit;
-    // Where nothing is near, the roots are all that a search looks at, and then it allocates nothing.
-    let mut next = Some((0, 0));
-    while let Some((first, second)) = next.take().or_else(|| open.pop()) {
-        budget.visit()?;
-        let (node_a, node_b) = (&a.nodes[first as usize], &b.nodes[second as usize]);
-        if !node_a.groups.meet(node_b.groups) {
-            continue;
-        }
-        if is_one && first == second {
-            if !node_a.is_leaf() {
-                let [left, right] = node_a.children;
-                push(open, [(left, right), (right, right), (left, left)]);
+
+    /// Compares a part with the children of a node from a lane on, and then what is in those that are near.
+    #[inline(always)]
+    fn search<I: Isa>(
+        &mut self,
+        isa: I,
+        first: Facing,
+        from_lane: usize,
+    ) -> Result<ControlFlow<()>, QueryError> {
+        // Where nothing is near, this is all that a search looks at, and then it allocates nothing.
+        let mut next = Some((first, from_lane));
+        while let Some((Facing { part, node, is_swapped }, from_lane)) =
+            next.take().or_else(|| Some((self.open.pop()?, 0)))
+        {
+            let [own, other] = if is_swapped { [self.trees[1], self.trees[0]] } else { self.trees };
+            let mut near = u32::from(other.near(isa, node, &part.bounds, self.limits.1));
+            near &= u32::MAX << from_lane;
+            self.budget.charge(1 + u64::from(near.count_ones()))?;
+            while near != 0 {
+                let met = other.part(node, near.trailing_zeros() as usize);
+                near &= near - 1;
+                if !met.groups.meet(part.groups) {
+                    continue;
+                }
+                self.open.push(match (part.child, met.child) {
+                    (Child::Place(x), Child::Place(y)) => {
+                        let squared_gap = own.bounds(part.child).squared_gap(&other.bounds(met.child));
+                        if squared_gap <= self.limits.0 && (self.visit)(x, y, squared_gap).is_break() {
+                            return Ok(ControlFlow::Break(()));
+                        }
+                        continue;
+                    }
+                    // The larger of two nodes is opened.
+                    (Child::Node(larger), Child::Node(_)) if part.bounds.girth() > met.bounds.girth() => {
+                        Facing { part: met, node: larger, is_swapped: !is_swapped }
+                    }
+                    (_, Child::Node(node)) => Facing { part, node, is_swapped },
+                    (Child::Node(node), _) => Facing { part: met, node, is_swapped: !is_swapped },
+                });
             }
-            continue;
         }
-        let squared_gap = node_a.bounds.squared_gap(&node_b.bounds);
-        if squared_gap > squared_limit {
-            continue;
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
+impl<V: FnMut(u32, u32, f64) -> ControlFlow<()>> Task for NearPairs<'_, V> {
+    type Output = Result<ControlFlow<()>, QueryError>;
+
+    #[inline(always)]
+    fn run<I: Isa>(mut self, isa: I) -> Self::Output {
+        let [a, b] = self.trees;
+        if !std::ptr::eq(a, b) {
+            let Some((part, other)) = a.whole().zip(b.whole()) else { return Ok(ControlFlow::Continue(())) };
+            if !part.groups.meet(other.groups) {
+                return Ok(ControlFlow::Continue(()));
+            }
+            return self.search(isa, Facing { part, node: 0, is_swapped: false }, 0);
         }
-        match (node_a.is_leaf(), node_b.is_leaf()) {
-            (true, true) => {
-                if visit(node_a.children[1], node_b.children[1], squared_gap).is_break() {
+        for node in a.nodes_with_pairs() {
+            for (lane, part) in a.parts(node).enumerate() {
+                // With the children behind it, so that each pair comes once.
+                if self.search(isa, Facing { part, node, is_swapped: false }, lane + 1)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
             }
-            (false, is_leaf) if is_leaf || node_a.bounds.girth() >= node_b.bounds.girth() => {
-                push(open, node_a.children.map(|child| (child, second)));
-            }
-            _ => push(open, node_b.children.map(|child| (first, child))),
         }
+        Ok(ControlFlow::Continue(()))
     }
-    Ok(ControlFlow::Continue(()))
-}
-
-/// Adds pairs of nodes to those that a search has yet to look at, with room for most searches at the first.
-fn push<const N: usize>(open: &mut Vec<(u32, u32)>, pairs: [(u32, u32); N]) {
-    if open.capacity() == 0 {
-        open.reserve(64);
-    }
-    open.extend(pairs);
 }
 
 /// The pairs of places whose groups meet, those with the nearest boxes first: a search of the trees by the least gap.
@@ -71,18 +112,18 @@ pub(in crate::scene) struct NearestFirst {
     open: BinaryHeap<Open>,
 }
 
-/// Two nodes of two trees, and the square of their gap.
+/// Parts of two trees, and the square of their gap.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     squared_gap: f64,
     trees: [Which; 2],
-    nodes: [u32; 2],
+    parts: [Child; 2],
 }
 
 impl Ord for Open {
     /// The greatest is the nearest. Of equally near pairs the order is any, but always the same.
     fn cmp(&self, other: &Self) -> Ordering {
-        let rest = |open: &Self| (open.trees, open.nodes);
+        let rest = |open: &Self| (open.trees, open.parts);
         other.squared_gap.total_cmp(&self.squared_gap).then_with(|| rest(self).cmp(&rest(other)))
     }
 }
@@ -103,17 +144,25 @@ impl Eq for Open {}
 
 impl NearestFirst {
     pub(in crate::scene) fn new(broad: &BroadPhase) -> Self {
-        let mut open = BinaryHeap::new();
+        let mut first = Self { open: BinaryHeap::new() };
         for trees in
             [[Which::Still, Which::Still], [Which::Moving, Which::Still], [Which::Moving, Which::Moving]]
         {
-            let [a, b] = trees.map(|which| broad.tree(which).nodes.first());
-            if let Some((a, b)) = a.zip(b).filter(|(a, b)| a.groups.meet(b.groups)) {
-                let squared_gap = if trees[0] == trees[1] { 0.0 } else { a.bounds.squared_gap(&b.bounds) };
-                open.push(Open { squared_gap, trees, nodes: [0, 0] });
+            if trees.iter().all(|which| broad.tree(*which).whole().is_some()) {
+                first.add(broad, trees, [Child::Node(0); 2]);
             }
         }
-        Self { open }
+        first
+    }
+
+    /// Adds two parts to those that wait, if their groups meet.
+    fn add(&mut self, broad: &BroadPhase, trees: [Which; 2], parts: [Child; 2]) {
+        let [a, b] = [0, 1].map(|side| (broad.tree(trees[side]), parts[side]));
+        if a.0.groups(a.1).meet(b.0.groups(b.1)) {
+            let is_one = trees[0] == trees[1] && parts[0] == parts[1];
+            let squared_gap = if is_one { 0.0 } else { a.0.bounds(a.1).squared_gap(&b.0.bounds(b.1)) };
+            self.open.push(Open { squared_gap, trees, parts });
+        }
     }
 
     /// Returns the next pair of places and the square of the gap of their boxes; nothing either if too many pairs wait to be
@@ -124,35 +173,36 @@ impl NearestFirst {
         budget: &mut Budget,
     ) -> Result<Option<(u32, u32, f64)>, QueryError> {
         while self.open.len() <= MAX_OPEN_PAIRS {
-            let Some(Open { squared_gap, trees, nodes }) = self.open.pop() else { break };
+            let Some(Open { squared_gap, trees, parts }) = self.open.pop() else { break };
             budget.visit()?;
-            let (a, b) = (broad.tree(trees[0]), broad.tree(trees[1]));
-            let (node_a, node_b) = (&a.nodes[nodes[0] as usize], &b.nodes[nodes[1] as usize]);
-            let is_one = trees[0] == trees[1] && nodes[0] == nodes[1];
-            if node_a.is_leaf() && node_b.is_leaf() {
-                if !is_one {
-                    return Ok(Some((node_a.children[1], node_b.children[1], squared_gap)));
+            let [tree_a, tree_b] = trees.map(|which| broad.tree(which));
+            let girth = |tree: &Tree, child| tree.bounds(child).girth();
+            match parts {
+                [Child::Place(x), Child::Place(y)] => {
+                    if trees[0] != trees[1] || x != y {
+                        return Ok(Some((x, y, squared_gap)));
+                    }
                 }
-                continue;
-            }
-            let mut add = |first: u32, second: u32| {
-                let (x, y) = (&a.nodes[first as usize], &b.nodes[second as usize]);
-                let is_one = trees[0] == trees[1] && first == second;
-                let squared_gap = if is_one { 0.0 } else { x.bounds.squared_gap(&y.bounds) };
-                if x.groups.meet(y.groups) {
-                    self.open.push(Open { squared_gap, trees, nodes: [first, second] });
+                [Child::Node(a), Child::Node(b)] if trees[0] == trees[1] && a == b => {
+                    for (lane, first) in tree_a.parts(a).enumerate() {
+                        for second in tree_a.parts(a).skip(lane) {
+                            self.add(broad, trees, [first.child, second.child]);
+                        }
+                    }
                 }
-            };
-            if is_one {
-                let [left, right] = node_a.children;
-                add(left, right);
-                add(left, left);
-                add(right, right);
-            } else if node_b.is_leaf() || !node_a.is_leaf() && node_a.bounds.girth() >= node_b.bounds.girth()
-            {
-                node_a.children.into_iter().for_each(|child| add(child, nodes[1]));
-            } else {
-                node_b.children.into_iter().for_each(|child| add(nodes[0], child));
+                [Child::Node(a), b]
+                    if matches!(b, Child::Place(_)) || girth(tree_a, parts[0]) >= girth(tree_b, b) =>
+                {
+                    for part in tree_a.parts(a) {
+                        self.add(broad, trees, [part.child, b]);
+                    }
+                }
+                [a, Child::Node(b)] => {
+                    for part in tree_b.parts(b) {
+                        self.add(broad, trees, [a, part.child]);
+                    }
+                }
+                [Child::Node(_), Child::Place(_)] => {}
             }
         }
         Ok(None)
