@@ -18,6 +18,7 @@ use crate::leaf::PACKET;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{encode_four_outward, encode_max_outward, encode_min_outward, residual_unit};
 use crate::slabs::{Group, NodeSlabs, row};
+use std::hint::select_unpredictable;
 
 /// Bytes of a short treelet.
 pub const SHORT_TREELET_BYTES: usize = 32;
@@ -196,9 +197,12 @@ impl Links {
         let rank = |of: u32| (of & before).count_ones();
         let kind = (self.kinds >> shift) & 15;
         match kind {
-            KIND_TREELET => Child::Treelet(self.first_treelet.wrapping_add(rank(self.treelets()) as u8)),
-            KIND_SHORT_TREELET => {
-                Child::Treelet(self.first_short.wrapping_add(rank(self.short_treelets()) as u8))
+            KIND_TREELET | KIND_SHORT_TREELET => {
+                // Which of both it is cannot be predicted.
+                let is_short = kind == KIND_SHORT_TREELET;
+                let first = select_unpredictable(is_short, self.first_short, self.first_treelet);
+                let of = select_unpredictable(is_short, self.short_treelets(), self.treelets());
+                Child::Treelet(first.wrapping_add(rank(of) as u8))
             }
             KIND_REMOTE => Child::Remote(self.first_remote.wrapping_add(rank(self.remotes()) as u8)),
             KIND_LEAF..=KIND_LEAF_LAST => Child::Leaf {

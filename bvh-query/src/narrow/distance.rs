@@ -26,6 +26,7 @@
 //! underflows after that is too small, relative to the lengths involved, to change the result.
 
 use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, subtract, triangles_intersect};
+use std::hint::select_unpredictable;
 
 /// How far two triangles are apart, and where; lengths in mesh units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -463,7 +464,7 @@ impl Differences {
             // If the rounded sum is less than 1, so is the exact one.
             let inside = (across > 0.0) & (along > 0.0) & (across + along < 1.0);
             let shortest = add_scaled(to_corner, -across, height);
-            squared[36 + 3 * side + k] = if inside { dot(shortest, shortest) } else { f64::INFINITY };
+            squared[36 + 3 * side + k] = select_unpredictable(inside, dot(shortest, shortest), f64::INFINITY);
             (feet.along[k], feet.across[k]) = (along, across);
         }
         feet

@@ -310,10 +310,10 @@ fn decode_node<I: Isa>(
         _ => TurningCodes::NONE,
     };
     to.links = opened.links;
-    isa.prefetch(bvh.packets_to_prefetch(object, &opened.page, &to.links));
+    isa.prefetch::<10>(bvh.packets_to_prefetch(object, &opened.page, &to.links));
     if bvh.is_worth_prefetching() {
         for treelets in opened.page.treelets_ahead(&to.links) {
-            isa.prefetch(treelets);
+            isa.prefetch::<8>(treelets);
         }
     }
     to.page = opened.page.header().page_number.get();

@@ -79,7 +79,7 @@ impl OpenedNode {
         };
         if bvh.is_worth_prefetching() {
             for treelets in page.treelets_ahead(&links) {
-                prefetch_ahead(isa, treelets);
+                isa.prefetch::<8>(treelets);
             }
         }
         let leaves = leaf_lanes(&links, 0) | leaf_lanes(&links, 1) << 4;
@@ -275,7 +275,7 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
             let node = &nodes.nodes[number as usize];
             if depth == kept_levels(parts) && bvh.is_worth_prefetching() {
                 for treelets in bvh.page(object, node.page)?.treelets_ahead(&node.links) {
-                    prefetch_ahead(isa, treelets);
+                    isa.prefetch::<8>(treelets);
                 }
             }
             let (mut inner, mut leaves) = (0, 0u32);
@@ -306,15 +306,6 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
             depth += usize::from(inner != 0);
         }
         Ok((opened * parts) as u64)
-    }
-}
-
-/// Prefetches the treelets of up to four children, without a branch for each.
-#[inline(always)]
-fn prefetch_ahead<I: Isa>(isa: I, treelets: &[u8]) {
-    let Some(last) = treelets.len().checked_sub(1) else { return };
-    for line in 0..8 {
-        isa.prefetch_line(&treelets[(64 * line).min(last)]);
     }
 }
 

@@ -29,7 +29,7 @@ use crate::isa::{Isa, Task};
 use crate::traverse::budget::Budget;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
-use crate::traverse::node_cache::{CachedNode, ChildLanes, ChildRef, NodeCache};
+use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
 use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
 use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
@@ -38,7 +38,7 @@ use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
 #[cfg(feature = "trace")]
 use crate::traverse::trace;
 use bvh_format::slabs::Group;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 /// The order in which pairs are visited.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -185,14 +185,36 @@ struct PairWalk<'a, 'p, W> {
     tests: u64,
 }
 
-/// Opened nodes of A and B whose children meet. If a node was not opened, its parent stands for it, and only this one child
-/// of the parent is tested.
-struct Sides {
-    node_a: usize,
-    only_a: Option<usize>,
-    node_b: usize,
-    only_b: Option<usize>,
+/// An opened node whose children meet those of the other side. If a node was not opened, its parent stands for it, and only
+/// this one child of the parent is tested.
+struct Side {
+    node: usize,
+    /// The groups of four children to test.
+    parts: Range<usize>,
+    /// The lanes of the children to test, of those that there are.
+    lanes: u16,
 }
+
+impl Side {
+    /// All children of an opened node.
+    #[inline(always)]
+    fn opened(node: usize, count: usize) -> Self {
+        Self { node, parts: 0..count.div_ceil(4), lanes: u16::MAX }
+    }
+
+    /// One child, whose lanes are those of `lanes_of_first` if it is the first of a group, and one step further for each
+    /// before it.
+    #[inline(always)]
+    fn only(child: ChildRef, (lanes_of_first, step): (u16, usize)) -> Self {
+        let part = child.child() / 4;
+        let lanes = lanes_of_first << (step * (child.child() % 4));
+        Self { node: child.node(), parts: part..part + 1, lanes }
+    }
+}
+
+/// The lanes of the first child of a group, as a child of A and of B, and the step to those of the next one.
+const LANES_OF_A: (u16, usize) = (0xf, 4);
+const LANES_OF_B: (u16, usize) = (0x1111, 1);
 
 /// Visits two leaf packets.
 pub(crate) struct VisitLeaves<'a, W> {
@@ -293,7 +315,7 @@ impl PairMemory {
     #[inline(always)]
     fn leaf_pair(&self, entry: Entry) -> Option<(LeafPacket, LeafPacket)> {
         let (a, b) = (self.nodes_a.get(entry.a.node()), self.nodes_b.get(entry.b.node()));
-        if !a.is_leaf(entry.a.child()) || !b.is_leaf(entry.b.child()) {
+        if !a.is_leaf(entry.a.child()) | !b.is_leaf(entry.b.child()) {
             return None;
         }
         Some((a.leaf(entry.a.child())?, b.leaf(entry.b.child())?))
@@ -353,7 +375,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 continue;
             }
             let sides = self.open(isa, next)?;
-            self.push_children(isa, &sides);
+            self.push_children(isa, sides);
             if self.phase() == Phase::BestFirst && self.memory.list.len() > MAX_LISTED_TESTS {
                 self.go_on_depth_first();
             }
@@ -441,7 +463,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
     #[inline(always)]
-    fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<Sides, QueryError> {
+    fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<[Side; 2], QueryError> {
         let (pair, tests) = (&self.pair, self.tests);
         let PairMemory { node_filter, nodes_a, nodes_b, aligned_b, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
@@ -451,38 +473,35 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         let (child_a, child_b) = (entry.a.child(), entry.b.child());
         let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
         let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
-        let mut sides = Sides {
-            node_a: entry.a.node(),
-            only_a: Some(child_a),
-            node_b: entry.b.node(),
-            only_b: Some(child_b),
-        };
+        let mut side_a = Side::only(entry.a, LANES_OF_A);
+        let mut side_b = Side::only(entry.b, LANES_OF_B);
         let a_is_small = extent_b > EXTENT_RATIO_TO_OPEN_ONE * extent_a;
         // In a forged file both comparisons may hold: one node is opened in any case.
-        let b_is_small = extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b && !a_is_small;
-        if !leaf_a && (leaf_b || !a_is_small) {
+        let b_is_small = (extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b) & !a_is_small;
+        // One branch each, as far as a processor can predict any.
+        if !leaf_a & (leaf_b | !a_is_small) {
             let number = nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
             #[cfg(feature = "trace")]
             trace::opened(0, entry.a, number);
-            (sides.node_a, sides.only_a) = (number, None);
+            side_a = Side::opened(number, nodes_a.get(number).count);
         }
-        if !leaf_b && (leaf_a || !b_is_small) {
+        if !leaf_b & (leaf_a | !b_is_small) {
             let number = nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
             #[cfg(feature = "trace")]
             trace::opened(1, entry.b, number);
-            (sides.node_b, sides.only_b) = (number, None);
+            side_b = Side::opened(number, nodes_b.get(number).count);
             let (to, is_aligned) = aligned_b.of(number);
             if !is_aligned {
                 let node = nodes_b.get(number);
                 isa.run(AlignB { node_filter, node, to, sweeps: W::SWEEPS });
             }
         }
-        Ok(sides)
+        Ok([side_a, side_b])
     }
 
     /// Tests all pairs of children and keeps those within the limit.
     #[inline(always)]
-    fn push_children<I: Isa>(&mut self, isa: I, sides: &Sides) {
+    fn push_children<I: Isa>(&mut self, isa: I, [of_a, of_b]: [Side; 2]) {
         let (measure, phase, order) = (W::MEASURE, self.phase(), self.order);
         let (limit, leaving_limit) = (gap_limit::<W>(self.limit), self.limit);
         let witness = if W::HAS_WITNESS { &self.witness } else { &None };
@@ -500,22 +519,20 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         } = &mut *self.memory;
         let node_filter = &**node_filter;
         let first_new = stack.len();
-        let (side_a, side_b) = (nodes_a.get(sides.node_a), nodes_b.get(sides.node_b));
+        let (side_a, side_b) = (nodes_a.get(of_a.node), nodes_b.get(of_b.node));
         // It was computed when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
-        let aligned_b = aligned_b.get(sides.node_b);
-        let (mut part_a, end_a) = parts(sides.only_a, side_a.count);
-        while part_a < end_a {
-            let (mut part_b, end_b) = parts(sides.only_b, side_b.count);
-            while part_b < end_b {
+        let aligned_b = aligned_b.get(of_b.node);
+        for part_a in of_a.parts {
+            for part_b in of_b.parts.clone() {
                 let tested = if phase == Phase::BestFirst { list.room() } else { stack.room() };
-                tested.a = ChildRef::new(sides.node_a, 4 * part_a);
-                tested.b = ChildRef::new(sides.node_b, 4 * part_b);
+                tested.a = ChildRef::new(of_a.node, 4 * part_a);
+                tested.b = ChildRef::new(of_b.node, 4 * part_b);
                 let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
                 let (lanes_a, lanes_b) = (&side_a.lanes[part_a & 1], &side_b.lanes[part_b & 1]);
                 let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
-                mask &= lanes_of_a(sides.only_a, lanes_a) & lanes_of_b(sides.only_b, lanes_b);
+                mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
                 if mask != 0 && slabs.are_due() {
-                    let nodes = ((&*nodes_a, sides.node_a), (&*nodes_b, sides.node_b));
+                    let nodes = ((&*nodes_a, of_a.node), (&*nodes_b, of_b.node));
                     mask = isa.run(TestSlabs {
                         memory: slabs,
                         node_filter,
@@ -527,7 +544,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     });
                 }
                 if mask != 0 && node_filter.looks_along_b() {
-                    let (to, is_aligned) = aligned_a.of(sides.node_a);
+                    let (to, is_aligned) = aligned_a.of(of_a.node);
                     if !is_aligned {
                         isa.run(AlignA { node_filter, node: side_a, to });
                     }
@@ -553,9 +570,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     Phase::Dive => stack.push(mask & 1u16.unbounded_shl(first), first),
                 }
                 self.tests += 1;
-                part_b += 1;
             }
-            part_a += 1;
         }
         if phase == Phase::Dive {
             stack.keep_nearest(first_new);
@@ -567,25 +582,4 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
 #[inline(always)]
 fn gap_limit<W: Visitor>(limit: f32) -> f32 {
     if W::MEASURE == Measure::Leaving { 0.0 } else { limit }
-}
-
-/// Returns the groups of four children to test: all groups, or the group of the only child to test.
-#[inline(always)]
-fn parts(only: Option<usize>, count: usize) -> (usize, usize) {
-    match only {
-        Some(child) => (child / 4, child / 4 + 1),
-        None => (0, count.div_ceil(4)),
-    }
-}
-
-/// Returns the lanes of the children of A to test: of all, or of the only one.
-#[inline(always)]
-fn lanes_of_a(only: Option<usize>, lanes: &ChildLanes) -> u16 {
-    only.map_or(lanes.all[0], |child| 0xf << (4 * (child % 4)))
-}
-
-/// Returns the lanes of the children of B to test.
-#[inline(always)]
-fn lanes_of_b(only: Option<usize>, lanes: &ChildLanes) -> u16 {
-    only.map_or(lanes.all[1], |child| 0x1111 << (child % 4))
 }
