@@ -12,7 +12,7 @@ use crate::scene::world_box::WorldBox;
 use crate::traverse::align::round_up;
 
 /// The most children of a node.
-pub(super) const WIDTH: usize = 16;
+const WIDTH: usize = 16;
 /// Stands for no lane of a node.
 const NONE: u32 = u32::MAX;
 /// A tree is built anew when the girths of its nodes have grown by this factor.
