@@ -198,7 +198,7 @@ impl Links {
         let kind = (self.kinds >> shift) & 15;
         match kind {
             KIND_TREELET | KIND_SHORT_TREELET => {
-                // Which of both it is cannot be predicted.
+                // Nothing predicts which of the two it is, so no branch asks.
                 let is_short = kind == KIND_SHORT_TREELET;
                 let first = select_unpredictable(is_short, self.first_short, self.first_treelet);
                 let of = select_unpredictable(is_short, self.short_treelets(), self.treelets());

@@ -201,7 +201,7 @@ pub(crate) trait Isa: Copy {
     fn prefetch_line(self, byte: &u8);
 
     /// Prefetches the first `LINES` cache lines of bytes that will soon be read. Where there are fewer, the last one is
-    /// prefetched again: that takes less time than a branch which nothing can predict.
+    /// prefetched again, which takes less time than a branch that nothing can predict.
     #[inline(always)]
     fn prefetch<const LINES: usize>(self, bytes: &[u8]) {
         let Some(last) = bytes.len().checked_sub(1) else { return };

@@ -23,9 +23,9 @@ pub(crate) enum Measure {
 const CUBE: f32 = 0.577_350_2;
 /// The inverse of sqrt 2, the length of directions 7 to 12, rounded down.
 const FACE: f32 = std::f32::consts::FRAC_1_SQRT_2.next_down();
-/// The inverse lengths of all directions.
-pub(super) const INVERSE_LENGTHS: [f32; 13] =
-    [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, FACE, FACE, FACE, FACE, FACE, FACE];
+/// The inverse lengths of all directions, by the rows of their slabs; 1 for rows without one.
+pub(super) const INVERSE_LENGTHS: [f32; 16] =
+    [1.0, 1.0, 1.0, CUBE, CUBE, CUBE, CUBE, 1.0, FACE, FACE, FACE, FACE, FACE, FACE, 1.0, 1.0];
 
 /// Bounds on the magnitudes of all nodes of an object, from those of its root.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -15,7 +15,7 @@ use crate::isa::{Isa, Lanes};
 use crate::traverse::align::FACTORS_BY_AXIS;
 use crate::traverse::node_filter::INVERSE_LENGTHS;
 use bvh_format::kdop::DirectionSet;
-use bvh_format::slabs::{Group, row};
+use bvh_format::slabs::Group;
 
 /// A point's slabs, in all four columns, and what makes a distance of a gap.
 pub(crate) struct PointFilter {
@@ -24,17 +24,6 @@ pub(crate) struct PointFilter {
     inverse_lengths: [[f32; 16]; 4],
     set: DirectionSet,
 }
-
-/// The inverse lengths of directions by rows.
-const INVERSE_LENGTHS_BY_ROW: [f32; 16] = {
-    let mut inverse = [1.0; 16];
-    let mut slab = 0;
-    while slab < 13 {
-        inverse[row(slab)] = INVERSE_LENGTHS[slab];
-        slab += 1;
-    }
-    inverse
-};
 
 /// More than `f32` loses of a subnormal number, 2^-148.
 const UNDERFLOW: f64 = f64::from_bits((1023 - 148) << 52);
@@ -52,7 +41,7 @@ impl PointFilter {
             let outward = 2.0 * error + along.abs() * f64::from(f32::EPSILON) + UNDERFLOW;
             lo[row] = (along - outward) as f32;
             hi[row] = (along + outward) as f32;
-            inverse_lengths[row] = INVERSE_LENGTHS_BY_ROW[row] * scale;
+            inverse_lengths[row] = INVERSE_LENGTHS[row] * scale;
         }
         // Rows without a slab have the whole line: their gaps are -infinity.
         for &row in rows_without_slab(set) {

@@ -151,10 +151,10 @@ pub(crate) struct ProbeStack {
 /// Levels made at once.
 const LEVELS: usize = 16;
 
-/// How many levels of nodes are kept: with four children up to 341 nodes, with eight up to 585.
+/// How many levels of nodes are kept, with the root's: of four children up to 341 nodes, of eight up to 585.
 #[inline(always)]
 fn kept_levels(parts: usize) -> usize {
-    6 - parts
+    if parts == 1 { 5 } else { 4 }
 }
 
 impl ProbeStack {

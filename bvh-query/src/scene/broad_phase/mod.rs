@@ -10,6 +10,7 @@
 //! be tested. Each step of a search is therefore charged to the budget of the question, and no search holds all pairs.
 
 mod by_key;
+mod least_first;
 mod pairs;
 mod tree;
 
@@ -279,5 +280,58 @@ mod tests {
             }
         }
         assert!(seen > 1000 && grown > 0, "{seen} {grown}");
+    }
+
+    /// Boxes on a lattice of several sizes touch or just do not: what `f32` rounds, underflows or overflows must lose no pair.
+    #[test]
+    fn pairs_that_touch_or_are_as_far_apart_as_the_limit_are_found_at_every_scale() {
+        let random = &mut Random::new(9);
+        let mut seen = 0;
+        for exponent in [-211, -149, -140, -75, -20, 0, 40, 63, 64, 100, 120] {
+            let unit = 2f64.powi(exponent);
+            // Ends that f32 cannot hold, some of them halfway between two that it can, and the next f64 beside them.
+            let end = |random: &mut Random| {
+                let third = (random.below(9) as f64 - 4.0 + 1.0 / 3.0) * unit;
+                let nearest = third as f32;
+                let halfway = (f64::from(nearest) + f64::from(nearest.next_up())) / 2.0;
+                let end = if random.below(2) == 0 { third } else { halfway };
+                [end.next_down(), end, end.next_up()][random.below(3)]
+            };
+            let items: Vec<Item> = (0..70)
+                .map(|place| {
+                    let corners = [(); 2].map(|()| [(); 3].map(|()| end(random)));
+                    let lo = [0, 1, 2].map(|k| corners[0][k].min(corners[1][k]));
+                    let hi = [0, 1, 2].map(|k| corners[0][k].max(corners[1][k]));
+                    Item { place, bounds: WorldBox { lo, hi }, groups: Groups::ALL }
+                })
+                .collect();
+            let mut broad = BroadPhase::default();
+            items.iter().for_each(|item| broad.replace(item.place));
+            broad.refresh(items.iter().copied(), items.len());
+            let gap = |a: &Item, b: &Item| a.bounds.squared_gap(&b.bounds);
+            let pairs =
+                || items.iter().flat_map(|a| items[a.place as usize + 1..].iter().map(move |b| (a, b)));
+            let gaps = || pairs().map(|(a, b)| gap(a, b)).filter(|gap| *gap > 0.0);
+            let least = gaps().fold(f64::INFINITY, f64::min).sqrt();
+            let any = gaps().next().unwrap_or(0.0).sqrt();
+            for limit in [0.0, least.next_down(), least, least.next_up(), any, any.next_up(), unit] {
+                let expected: Vec<_> = pairs()
+                    .filter(|(a, b)| gap(a, b) <= limit * limit)
+                    .map(|(a, b)| (a.place, b.place))
+                    .collect();
+                for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+                    let mut found = Vec::new();
+                    let visited = broad.pairs(backend, limit, &mut Budget::new(u64::MAX), |a, b, _| {
+                        found.push((a.min(b), a.max(b)));
+                        ControlFlow::Continue(())
+                    });
+                    assert_eq!(visited, Ok(ControlFlow::Continue(())));
+                    found.sort_unstable();
+                    assert_eq!(found, expected, "2^{exponent}, {limit:e}, {backend}");
+                }
+                seen += expected.len();
+            }
+        }
+        assert!(seen > 1000, "{seen}");
     }
 }

@@ -1,11 +1,11 @@
 //! The pairs of instances that are near each other: all within a distance, or one after another, the nearest first.
 
+use super::least_first::LeastFirst;
 use super::tree::{Child, Part, Tree, squared_limit};
 use super::{BroadPhase, Which};
 use crate::error::QueryError;
 use crate::isa::{Isa, Task};
 use crate::traverse::budget::Budget;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
@@ -109,38 +109,12 @@ impl<V: FnMut(u32, u32, f64) -> ControlFlow<()>> Task for NearPairs<'_, V> {
 
 /// The pairs of places whose groups meet, those with the nearest boxes first: a search of the trees by the least gap.
 pub(in crate::scene) struct NearestFirst {
-    open: BinaryHeap<Open>,
+    /// Parts of two trees by the squares of their gaps.
+    open: BinaryHeap<LeastFirst<Parts>>,
 }
 
-/// Parts of two trees, and the square of their gap.
-#[derive(Clone, Copy, Debug)]
-struct Open {
-    squared_gap: f64,
-    trees: [Which; 2],
-    parts: [Child; 2],
-}
-
-impl Ord for Open {
-    /// The greatest is the nearest. Of equally near pairs the order is any, but always the same.
-    fn cmp(&self, other: &Self) -> Ordering {
-        let rest = |open: &Self| (open.trees, open.parts);
-        other.squared_gap.total_cmp(&self.squared_gap).then_with(|| rest(self).cmp(&rest(other)))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Open {}
+/// A part of a tree, and a part of the same tree or of the other one.
+type Parts = ([Which; 2], [Child; 2]);
 
 impl NearestFirst {
     pub(in crate::scene) fn new(broad: &BroadPhase) -> Self {
@@ -161,7 +135,7 @@ impl NearestFirst {
         if a.0.groups(a.1).meet(b.0.groups(b.1)) {
             let is_one = trees[0] == trees[1] && parts[0] == parts[1];
             let squared_gap = if is_one { 0.0 } else { a.0.bounds(a.1).squared_gap(&b.0.bounds(b.1)) };
-            self.open.push(Open { squared_gap, trees, parts });
+            self.open.push(LeastFirst { number: squared_gap, of: (trees, parts) });
         }
     }
 
@@ -173,7 +147,7 @@ impl NearestFirst {
         budget: &mut Budget,
     ) -> Result<Option<(u32, u32, f64)>, QueryError> {
         while self.open.len() <= MAX_OPEN_PAIRS {
-            let Some(Open { squared_gap, trees, parts }) = self.open.pop() else { break };
+            let Some(LeastFirst { number: squared_gap, of: (trees, parts) }) = self.open.pop() else { break };
             budget.visit()?;
             let [tree_a, tree_b] = trees.map(|which| broad.tree(which));
             let girth = |tree: &Tree, child| tree.bounds(child).girth();

@@ -309,10 +309,10 @@ impl Tree {
     }
 }
 
-/// Returns a limit for [`Tree::near`] that leaves all boxes whose squared gap is at most `squared_limit`.
-pub(super) fn squared_limit(squared_limit: f64) -> f32 {
+/// Returns a limit for [`Tree::near`] that leaves all boxes whose squared gap is at most `squared`.
+pub(super) fn squared_limit(squared: f64) -> f32 {
     // More than the roundings of `near`, and than `WorldBox::squared_gap` takes off.
-    round_up(squared_limit * (1.0 + 1.0 / (1 << 17) as f64))
+    round_up(squared * (1.0 + 1.0 / (1 << 17) as f64))
 }
 
 /// Returns the number of children of a node of so many instances: as few as have room for them, if all but the last are
