@@ -25,9 +25,10 @@
 //! less time for poses that follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points,
 //! rays and segments. Batches, and scenes on all cores, need the feature `parallel`, which is on by default and adds
 //! the dependency on rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the
-//! feature `trace` records which nodes and packets a question visits. Points,
-//! rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in the world, in the
-//! world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
+//! features `trace` and `stages` are for tools: one records which nodes and packets a question visits, the other measures
+//! how long the stages of a question take. Points, rays and segments are given in the frame of a mesh or, for a mesh that
+//! [`Shape::at`] places in the world, in the world. Each kind of operation has an error of its own, and all of them
+//! convert into [`Error`].
 //!
 //! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2,
 //! NEON, SIMD128 or portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have
@@ -145,6 +146,13 @@ pub struct Embedded<B: ?Sized>(pub B);
 #[cfg(feature = "trace")]
 pub mod trace {
     pub use crate::traverse::trace::{Step, record};
+}
+
+/// What the stages of a question take.
+#[cfg(feature = "stages")]
+pub mod stages {
+    pub use crate::isa::ticks::ticks;
+    pub use crate::traverse::stages::{Spent, Stage, record};
 }
 
 pub use bvh_format::leaf::TriangleEncoding;

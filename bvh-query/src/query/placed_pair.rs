@@ -10,6 +10,7 @@ use crate::leaf::placed_packet::{PlacedPacket, PlacedPackets};
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::traverse::placement::{ObjectPair, Placement};
+use crate::traverse::stages::Stage;
 use crate::traverse::walk::{Visitor, traverse};
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
@@ -65,6 +66,7 @@ impl PlacedPair<'_> {
     ) -> Result<&'a PlacedPacket, QueryError> {
         let (known, placed) = packets.place(leaf.page, leaf.packet);
         if !known {
+            let _stage = Stage::Place.enter();
             let ObjectPair { bvh_a, object_a, .. } = self.pair;
             placed.place_a(isa, self.frame(), bvh_a.packet(isa, object_a, leaf, &mut Packet::default())?);
         }
@@ -81,6 +83,7 @@ impl PlacedPair<'_> {
     ) -> Result<&'a PlacedPacket, QueryError> {
         let (known, placed) = packets.place(leaf.page, leaf.packet);
         if !known {
+            let _stage = Stage::Place.enter();
             let ObjectPair { bvh_b, object_b, .. } = self.pair;
             placed.place_b(isa, self.frame(), bvh_b.packet(isa, object_b, leaf, &mut Packet::default())?);
         }

@@ -9,6 +9,7 @@ use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::decode::{Parent, decode_group};
 use crate::traverse::node_filter::Reach;
+use crate::traverse::stages::Stage;
 use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef, check_crossing, check_parent};
@@ -241,6 +242,7 @@ impl NodeCache {
         if known != CLOSED {
             return Ok(known as usize);
         }
+        let _stage = Stage::Decode.enter();
         if self.used >= self.max_nodes {
             return Err(too_many(bvh, object, self.max_nodes));
         }

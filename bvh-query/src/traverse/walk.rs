@@ -35,6 +35,7 @@ use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
+use crate::traverse::stages::Stage;
 #[cfg(feature = "trace")]
 use crate::traverse::trace;
 use bvh_format::slabs::Group;
@@ -155,6 +156,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     budget: &mut Budget,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
+    let _stage = Stage::Walk.enter();
     memory.start(isa, &pair, W::SWEEPS)?;
     if W::MEASURE == Measure::Leaving {
         memory.node_filter.prepare_ways(visitor.direction());
@@ -165,6 +167,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         PairWalk { pair, memory, budget, visitor, limit: 0.0, witness: None, order, phase, tests: 0 };
     walk.follow_visitor();
     if walk.visit_all(isa)?.is_continue() {
+        let _stage = Stage::Finish.enter();
         isa.run(Finish(&mut *walk.visitor))?;
     }
     Ok(walk.tests)
@@ -292,6 +295,7 @@ impl PairMemory {
     fn start<I: Isa>(&mut self, isa: I, pair: &ObjectPair<'_>, sweeps: bool) -> Result<(), QueryError> {
         #[cfg(feature = "trace")]
         trace::objects(pair);
+        let _stage = Stage::Prepare.enter();
         self.walk += 1;
         self.stack.clear();
         self.leaf_pairs.clear();
@@ -338,6 +342,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             self.memory.list.push_one(Entry::ROOTS);
         }
         loop {
+            let stage = Stage::Choose.enter();
             if W::MAY_BE_BEST_FIRST && self.order != Order::Any {
                 self.memory.stack.drop_beyond(self.limit);
             }
@@ -355,6 +360,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     None => return Ok(ControlFlow::Continue(())),
                 },
             };
+            stage.leave();
             self.budget.visit()?;
             // Depth-first, pairs of leaf packets never come on the stack.
             if W::MAY_BE_BEST_FIRST
@@ -374,7 +380,9 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             if self.is_beyond_large_leaf(next)? {
                 continue;
             }
+            let stage = Stage::Open.enter();
             let sides = self.open(isa, next)?;
+            stage.leave();
             self.push_children(isa, sides);
             if self.phase() == Phase::BestFirst && self.memory.list.len() > MAX_LISTED_TESTS {
                 self.go_on_depth_first();
@@ -420,6 +428,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     ) -> Result<ControlFlow<()>, QueryError> {
         #[cfg(feature = "trace")]
         trace::packets(leaves);
+        let _stage = Stage::Packets.enter();
         let flow = isa.run(VisitLeaves { visitor: &mut *self.visitor, leaves, at_once })?;
         self.follow_visitor();
         Ok(flow)
@@ -451,6 +460,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         if W::SWEEPS || self.tests < NODE_TESTS_BEFORE_TRIANGLE_BOUNDS {
             return Ok(false);
         }
+        let _stage = Stage::LargeLeaf.enter();
         let PairMemory { node_filter, nodes_a, nodes_b, large_leaves, .. } = &mut *self.memory;
         large_leaves.are_beyond(
             &self.pair,
@@ -467,6 +477,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         let (pair, tests) = (&self.pair, self.tests);
         let PairMemory { node_filter, nodes_a, nodes_b, aligned_b, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
+            let _stage = Stage::PrepareAlongB.enter();
             node_filter.look_along_b(isa);
         }
         let (node_a, node_b) = (nodes_a.get(entry.a.node()), nodes_b.get(entry.b.node()));
@@ -492,6 +503,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             side_b = Side::opened(number, nodes_b.get(number).count);
             let (to, is_aligned) = aligned_b.of(number);
             if !is_aligned {
+                let _stage = Stage::AlignB.enter();
                 let node = nodes_b.get(number);
                 isa.run(AlignB { node_filter, node, to, sweeps: W::SWEEPS });
             }
@@ -529,9 +541,12 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 tested.b = ChildRef::new(of_b.node, 4 * part_b);
                 let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
                 let (lanes_a, lanes_b) = (&side_a.lanes[part_a & 1], &side_b.lanes[part_b & 1]);
+                let stage = Stage::TestAlongA.enter();
                 let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
+                stage.leave();
                 mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
                 if mask != 0 && slabs.are_due() {
+                    let _stage = Stage::Slabs.enter();
                     let nodes = ((&*nodes_a, of_a.node), (&*nodes_b, of_b.node));
                     mask = isa.run(TestSlabs {
                         memory: slabs,
@@ -546,8 +561,10 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 if mask != 0 && node_filter.looks_along_b() {
                     let (to, is_aligned) = aligned_a.of(of_a.node);
                     if !is_aligned {
+                        let _stage = Stage::AlignA.enter();
                         isa.run(AlignA { node_filter, node: side_a, to });
                     }
+                    let _stage = Stage::TestAlongB.enter();
                     let groups = (&to[part_a & 1], &side_b.groups[part_b & 1]);
                     mask &= node_filter.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
                 }
@@ -555,6 +572,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     let groups = (&side_a.groups[part_a & 1], &aligned_b[part_b & 1]);
                     mask &= node_filter.leaving(isa, groups, leaving_limit, &mut tested.bounds);
                 }
+                let stage = Stage::Keep.enter();
                 if phase == Phase::DepthFirst {
                     let leaves = lanes_a.leaves[0] & lanes_b.leaves[1];
                     leaf_pairs.append(tested, mask & leaves);
@@ -569,6 +587,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     Phase::BestFirst => list.push(mask, first),
                     Phase::Dive => stack.push(mask & 1u16.unbounded_shl(first), first),
                 }
+                stage.leave();
                 self.tests += 1;
             }
         }
