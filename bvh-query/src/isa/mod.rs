@@ -15,8 +15,8 @@
 macro_rules! with_features {
     ($body:expr) => {
         // SAFETY: a value of the backend's types exists only if the target has all features that these intrinsics need, or
-        // if `detect` has found that the CPU has them. Loads and stores go through references to arrays of exactly their size, or to parts of such
-        // arrays, and need no alignment.
+        // if `detect` has found that the CPU has them. Loads and stores go through references to arrays of exactly their
+        // size, or to parts of such arrays, and need no alignment.
         unsafe { $body }
     };
 }

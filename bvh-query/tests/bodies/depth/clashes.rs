@@ -80,7 +80,10 @@ fn a_scene_lists_what_its_pairs_say_with_any_number_of_threads() {
     let classes: Vec<_> = found.iter().map(|clash| clash.clash.class).collect();
     use ClashClass::{Duplicated, Near, Overlapping, Touching};
     assert_eq!(classes, [Overlapping, Touching, Near, Near, Duplicated]);
-    scene.set_parallel(true);
-    assert_eq!(scene.clashes(&options).unwrap(), found);
+    #[cfg(feature = "parallel")]
+    {
+        scene.set_parallel(true);
+        assert_eq!(scene.clashes(&options).unwrap(), found);
+    }
     assert!(scene.clashes(&ClashOptions::new().clearance(f64::NAN)).is_err());
 }

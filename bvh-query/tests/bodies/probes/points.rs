@@ -2,9 +2,9 @@
 
 use crate::common::shapes::{cube, moved, plate, sphere, torus};
 use crate::common::{Random, Triangle, bake, baked, mesh, note, queriers, random_pose, shared};
+use bvh_query::{NumberError, Pose, QueryError};
 #[cfg(feature = "parallel")]
-use bvh_query::ProbeBatch;
-use bvh_query::{NumberError, Pose, Querier, QueryError};
+use bvh_query::{ProbeBatch, Querier};
 use cbvh_testkit::depth::rounds;
 
 /// A label that is not the least distance, and what is: computed with rationals over all triangles near the point.
