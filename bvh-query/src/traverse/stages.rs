@@ -208,7 +208,7 @@ mod clock {
                     let pose = Pose::new(*Pose::IDENTITY.rotation(), [shift, shift / 3.0, 0.0]).unwrap();
                     let start = ticks();
                     let (answer, spent) = record(|| ask(&mut querier, &bvh, &pose));
-                    let whole = ticks() - start;
+                    let whole = ticks().saturating_sub(start);
                     answer.unwrap();
                     let stats = querier.stats();
                     let calls = |stage: Stage| spent[stage as usize].calls;
