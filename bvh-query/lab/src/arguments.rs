@@ -43,8 +43,8 @@ pub(crate) struct SearchArguments {
 }
 
 /// Every pose is asked once before anything is measured. Then each round asks all poses with the clock of the stages, and
-/// all of them again without. The fastest time of each pose counts. The table has the sums over all poses, by query: how
-/// often a stage was entered, its ticks without those of stages within it, and its share.
+/// all of them again without. The fastest time of each pose counts. The table has averages over all
+/// poses: how often a stage was entered, its ticks without those of stages within it, and its share.
 #[cfg(feature = "stages")]
 #[derive(Debug, Args)]
 pub(crate) struct StagesArguments {

@@ -94,15 +94,25 @@ fn table(fastest: &[[Measured; 2]]) -> Result<(String, String), Failure> {
 
 /// Reads poses, one per line: the rows of a 3 by 4 matrix. `#` starts a comment.
 fn read_poses(path: &Path) -> Result<Vec<Pose>, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let mut poses = Vec::new();
-    for line in std::fs::read_to_string(path)?.lines() {
-        let words = line.split('#').next().unwrap_or("").split_whitespace();
-        let numbers: Vec<f64> = words.map(str::parse).collect::<Result<_, _>>()?;
-        match <&[f64; 12]>::try_from(&numbers[..]) {
-            Ok(rows) => poses.push(Pose::from_rows(rows)?),
-            Err(_) if numbers.is_empty() => {}
-            Err(_) => return Err(format!("expected 12 numbers in a line, found {}", numbers.len()).into()),
+    for (number, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split('#').next().unwrap_or("").split_whitespace().collect();
+        if !words.is_empty() {
+            let place = format!("{}, line {}", path.display(), number + 1);
+            poses.push(read_pose(&words).map_err(|error| format!("{place}: {error}"))?);
         }
     }
-    if poses.is_empty() { Err("expected at least one pose, found none".into()) } else { Ok(poses) }
+    if poses.is_empty() {
+        return Err(format!("{}: expected at least one pose, found none", path.display()).into());
+    }
+    Ok(poses)
+}
+
+fn read_pose(words: &[&str]) -> Result<Pose, Failure> {
+    let numbers: Vec<f64> = words.iter().map(|word| word.parse()).collect::<Result<_, _>>()?;
+    match <&[f64; 12]>::try_from(&numbers[..]) {
+        Ok(rows) => Ok(Pose::from_rows(rows)?),
+        Err(_) => Err(format!("expected 12 numbers, found {}", numbers.len()).into()),
+    }
 }

@@ -37,3 +37,27 @@ fn stages_have_calls_and_shares_of_their_sum() {
         assert!((shares - 100.0).abs() < 2.0, "{shares}");
     }
 }
+
+#[test]
+fn poses_that_are_none_are_refused_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = folder.path().join("poses.txt");
+    let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/ok-everything.cbvh");
+    for (text, said) in [
+        ("1 0 0\n", "line 1: expected 12 numbers, found 3"),
+        ("# none\n", "expected at least one pose"),
+        ("\n1 0 0 x 0 1 0 0 0 0 1 0\n", "line 2: "),
+        ("1 0 0 nan 0 1 0 0 0 0 1 0\n", "line 1: "),
+        ("1 0 0 inf 0 1 0 0 0 0 1 0\n", "line 1: "),
+        ("2 0 0 0 0 1 0 0 0 0 1 0\n", "line 1: "),
+    ] {
+        std::fs::write(&poses, text).unwrap();
+        let mut lab = Command::new(env!("CARGO_BIN_EXE_cbvh-lab"));
+        let ended = lab.args(["stages", mesh, mesh]).arg(&poses).output().unwrap();
+        let error = String::from_utf8(ended.stderr).unwrap();
+        assert!(
+            !ended.status.success() && error.contains(said) && error.contains("poses.txt"),
+            "{text}: {error}"
+        );
+    }
+}
