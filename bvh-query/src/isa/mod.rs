@@ -47,6 +47,7 @@ pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
 pub(crate) mod avx512;
+pub(crate) mod corners;
 #[allow(unsafe_code, reason = "registers of the CPU; each block says why it is sound")]
 pub mod floats;
 #[cfg(target_arch = "aarch64")]
@@ -63,6 +64,7 @@ mod simd128;
 pub(crate) mod ticks;
 
 use bvh_format::slabs::Group;
+use corners::Corners;
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -133,14 +135,25 @@ fn rows_at(group: &Group, starts: [u32; 4]) -> [&[f32; 4]; 4] {
     starts.map(|start| numbers[(start & 124) as usize..].first_chunk().unwrap_or(&[0.0; 4]))
 }
 
+/// Returns an integer that is smaller for smaller numbers; none is NaN.
+#[inline(always)]
+pub(crate) fn in_order(number: f32) -> i32 {
+    let bits = number.to_bits() as i32;
+    bits ^ (bits >> 31 & i32::MAX)
+}
+
 /// The token of a backend, and the operations that its CPU features allow.
 pub(crate) trait Isa: Copy {
     /// A register of sixteen lanes.
     type V: Lanes;
     /// A register of four lanes.
     type H: Lanes;
+    /// A register of `f64` for three corners.
+    type C: Corners;
     /// The rows of a group, in the form that `pick` reads.
     type Rows<'a>: Copy;
+
+    fn corners(self, from: [f64; 3]) -> Self::C;
 
     fn splat(self, value: f32) -> Self::V;
     fn load(self, from: &[f32; 16]) -> Self::V;
@@ -196,6 +209,19 @@ pub(crate) trait Isa: Copy {
             if of[lane as usize & 15] < of[least as usize & 15] {
                 least = lane;
             }
+        }
+        least
+    }
+
+    /// The least of the keys of the elements whose bits are set: `in_order`, with the number of the lane in the lowest four
+    /// bits. None of them is NaN.
+    #[inline(always)]
+    fn nearest(self, of: &[f32; 16], mask: u16) -> i32 {
+        let (mut mask, mut least) = (mask, i32::MAX);
+        while mask != 0 {
+            let lane = mask.trailing_zeros();
+            mask &= mask - 1;
+            least = least.min(in_order(of[lane as usize & 15]) & !15 | lane as i32);
         }
         least
     }

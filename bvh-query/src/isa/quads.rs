@@ -1,7 +1,8 @@
 //! Sixteen lanes in four registers of four, for CPUs whose registers have 128 bits. A backend states what is done to one
 //! register; the rest follows.
 
-use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
+use super::corners::Three;
+use super::{FourRows, Isa, Lanes, Part, Task, in_order, rows_at};
 use bvh_format::slabs::Group;
 use std::marker::PhantomData;
 
@@ -128,8 +129,13 @@ impl<Q> Copy for Quads<Q> {}
 impl<Q: Quad> Isa for Quads<Q> {
     type V = Four<Q>;
     type H = Q;
+    type C = Three;
     type Rows<'a> = &'a Group;
 
+    #[inline(always)]
+    fn corners(self, from: [f64; 3]) -> Three {
+        Three::new(from)
+    }
     #[inline(always)]
     fn splat(self, value: f32) -> Four<Q> {
         let each = Q::splat(value);
@@ -253,6 +259,16 @@ impl<Q: Quad> Isa for Quads<Q> {
         let [a, b, c, d] = least;
         let least = self.splat(smaller(smaller(a, b), smaller(c, d)));
         (mask & Four::<Q>::bits(chosen.le(least))).trailing_zeros()
+    }
+    #[inline(always)]
+    fn nearest(self, of: &[f32; 16], mask: u16) -> i32 {
+        // In lanes, because the instructions for them are part of the target.
+        let mut keys = [i32::MAX; 16];
+        for lane in 0..16 {
+            let key = in_order(of[lane]) & !15 | lane as i32;
+            keys[lane] = if mask >> lane & 1 == 1 { key } else { i32::MAX };
+        }
+        keys.into_iter().fold(i32::MAX, i32::min)
     }
     #[inline(always)]
     fn prefetch_line(self, byte: &u8) {

@@ -1,6 +1,7 @@
 //! Tests that backends agree: they decode every profile and packed packets to the bits of the reference, compare in the same
-//! way, and find the same least lane.
+//! way, find the same least and nearest lane, and compute the same of three corners.
 
+use super::corners::Corners;
 use super::{Backend, Isa, Lanes, Task};
 use crate::file::unpack::unpack;
 use crate::traverse::decode::{Parent, decode_group};
@@ -175,6 +176,109 @@ fn every_backend_finds_the_first_of_the_least_lanes() {
                 expected,
                 "{backend}, round {round}: {lanes:?}"
             );
+        }
+    }
+}
+
+struct Nearest<'a>(&'a [f32; 16], u16);
+
+impl Task for Nearest<'_> {
+    type Output = i32;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> i32 {
+        isa.nearest(self.0, self.1)
+    }
+}
+
+#[test]
+fn every_backend_finds_the_same_nearest_lane() {
+    let mut random = Random::new(6);
+    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        for round in 0..5000 {
+            let values = [f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1.5, -2.5, 1e-40, -1e-40];
+            let lanes: [f32; 16] = std::array::from_fn(|_| {
+                let value = values[random.below(values.len())];
+                if value.is_finite() {
+                    f32::from_bits(value.to_bits() ^ random.below(32) as u32)
+                } else {
+                    value
+                }
+            });
+            let mask = random.bits() as u16;
+            let found = backend.run(Nearest(&lanes, mask));
+            let expected = (0..16).filter(|lane| mask >> lane & 1 == 1).map(|lane| {
+                // The bits of a negative number count backwards.
+                let bits = lanes[lane].to_bits() as i32;
+                let order = if bits < 0 { i32::MIN - bits - 1 } else { bits };
+                order.div_euclid(16) * 16 + lane as i32
+            });
+            assert_eq!(found, expected.min().unwrap_or(i32::MAX), "{backend}, round {round}: {lanes:?}");
+        }
+    }
+}
+
+struct OfCorners([f64; 3], [f64; 3]);
+
+/// All operations with two operands, `abs`, the choice of where the first is less and of where both comparisons hold, and the largest.
+impl Task for OfCorners {
+    type Output = ([[f64; 3]; 9], f64);
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        let (x, y, two) = (isa.corners(self.0), isa.corners(self.1), isa.corners([2.0; 3]));
+        let (less, small) = (x.lt(y), x.lt(two));
+        let both = <I::C as Corners>::and(less, small);
+        let all = [x.add(y), x.sub(y), x.mul(y), x.div(y), x.min(y), x.max(y), x.abs()];
+        let [add, sub, mul, div, min, max, abs] = all;
+        let (less, both) = (<I::C as Corners>::select(less, x, y), <I::C as Corners>::select(both, x, y));
+        let all = [
+            add.all(),
+            sub.all(),
+            mul.all(),
+            div.all(),
+            min.all(),
+            max.all(),
+            abs.all(),
+            less.all(),
+            both.all(),
+        ];
+        assert_eq!([0, 1, 2].map(|corner| y.of(corner)), y.all());
+        (all, x.largest())
+    }
+}
+
+#[test]
+fn every_backend_computes_the_same_of_corners() {
+    let mut random = Random::new(7);
+    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        for _ in 0..2000 {
+            let mut number =
+                || [0.0, -1.5, 5e-324, f64::MAX, 1e-300, random.signed(), random.signed()][random.below(7)];
+            let mut three = || [number(), number(), number()];
+            let (x, y) = (three(), three());
+            let (all, largest) = backend.run(OfCorners(x, y));
+            let each = |f: fn(f64, f64) -> f64| [f(x[0], y[0]), f(x[1], y[1]), f(x[2], y[2])];
+            let less = |x, y| if x < y { x } else { y };
+            let expected = [
+                each(|x, y| x + y),
+                each(|x, y| x - y),
+                each(|x, y| x * y),
+                each(|x, y| x / y),
+                each(less),
+                each(|x, y| if x > y { x } else { y }),
+                x.map(f64::abs),
+                each(less),
+                each(|x, y| if x < y && x < 2.0 { x } else { y }),
+            ];
+            let bits = |all: [[f64; 3]; 9]| {
+                all.as_flattened().iter().map(|x| (x.to_bits(), x.is_nan())).collect::<Vec<_>>()
+            };
+            for (found, expected) in bits(all).iter().zip(bits(expected)) {
+                // Which NaN it is does not matter.
+                assert!(*found == expected || found.1 && expected.1, "{backend}: {x:?} {y:?}");
+            }
+            assert_eq!(largest, x[0].max(x[1]).max(x[2]));
         }
     }
 }

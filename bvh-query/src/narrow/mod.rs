@@ -16,6 +16,7 @@
 //! of three differences at most 2^378, and splitting multiplies by at most 2^27. Outside this range no routine
 //! panics, but the answer is no longer proven.
 
+mod candidates;
 mod distance;
 mod integers;
 mod intersect;
@@ -28,7 +29,7 @@ mod stretch;
 mod winding;
 mod within;
 
-pub(crate) use distance::{Closest, triangle_distance, triangle_distance_apart};
+pub(crate) use distance::{Closest, triangle_distance, triangle_distance_with};
 pub(crate) use intersect::{segment_intersects, triangles_intersect};
 pub(crate) use point::point_distance;
 pub(crate) use ray::{Crossing, Ray};

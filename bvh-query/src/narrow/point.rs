@@ -5,12 +5,15 @@
 //! This leaves 3 corners, 3 edges and the face. Each is computed by the same operations in the same order, and so are
 //! the bounds. The general routine is only needed for the search for a better lower bound, which is rare.
 
+use super::candidates::Foot;
 use super::distance::{
-    Closest, Foot, MAX_ERROR_ASYMMETRY, certified_gap, longest, negated, perpendicular_normal,
-    perpendicular_part, reciprocal_exponent, times,
+    Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, longest, negated, perpendicular_part,
+    reciprocal_exponent, times,
 };
 use super::intersect::triangle_contains;
-use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, subtract, triangle_distance_apart};
+use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, subtract, triangle_distance};
+use crate::isa::Isa;
+use crate::isa::scalar::Scalar;
 
 /// Returns the distance of a point from a closed triangle, with bounds and the closest point.
 ///
@@ -26,32 +29,34 @@ pub(crate) fn point_distance(triangle: &Triangle, point: Point) -> Closest {
     ];
     let size = largest(&gaps).max(largest(&edges));
     if size == 0.0 {
-        return meeting(triangle[0]);
+        return Closest::meeting(triangle[0]);
     }
     let scale = reciprocal_exponent(size);
     let unit = 1.0 / scale;
     let gaps = [times(scale, gaps[0]), times(scale, gaps[1]), times(scale, gaps[2])];
     let edges = [times(scale, edges[0]), times(scale, edges[1]), times(scale, edges[2])];
     let foot = closest_foot(&gaps, &edges);
-    let [along, across] = foot.offsets(&edges).map(negated);
+    let by_axis = |t: &Triangle| [0, 1, 2].map(|axis| Scalar.corners([t[0][axis], t[1][axis], t[2][axis]]));
+    let placed = Placed::new(foot, &by_axis(&edges));
+    let [along, across] = placed.offsets().map(negated);
     let gap = gaps[foot.corner];
     let between = add_scaled(add_scaled(gap, 1.0, along), 1.0, across);
     let direction = if foot.across != 0.0 {
-        perpendicular_normal(edges[foot.corner], edges[(foot.corner + 2) % 3])
+        placed.normal()
     } else if foot.along != 0.0 {
         perpendicular_part(edges[foot.corner], between)
     } else {
         between
     };
-    let lower = certified_gap(direction, &gaps);
+    let lower = certified_gap(Scalar, direction, &[by_axis(&gaps)]);
     if lower == 0.0 && triangle_contains(triangle, point) {
-        return meeting(foot.place(triangle, &edges, unit));
+        return Closest::meeting(placed.place(triangle, unit));
     }
     let magnitude: f64 = [gap, along, across].iter().flatten().map(|x| x.abs()).sum();
     let length = dot(between, between).sqrt();
     let upper = length * (1.0 + 8.0 * UNIT_ROUNDOFF) + 8.0 * UNIT_ROUNDOFF * magnitude;
     if length - lower > MAX_ERROR_ASYMMETRY * (upper - length) {
-        return triangle_distance_apart(triangle, &[point; 3]);
+        return triangle_distance(triangle, &[point; 3]);
     }
     let distance = (length * unit).max(f64::MIN_POSITIVE);
     let lower = lower * unit;
@@ -59,14 +64,9 @@ pub(crate) fn point_distance(triangle: &Triangle, point: Point) -> Closest {
         distance,
         lower: if lower < f64::MIN_POSITIVE { 0.0 } else { lower.min(distance) },
         upper: (upper * unit).max(distance),
-        point_a: foot.place(triangle, &edges, unit),
+        point_a: placed.place(triangle, unit),
         point_b: point,
     }
-}
-
-/// The result for a point of the triangle.
-fn meeting(point: Point) -> Closest {
-    Closest { distance: 0.0, lower: 0.0, upper: 0.0, point_a: point, point_b: point }
 }
 
 #[inline(always)]

@@ -9,8 +9,8 @@
 
 use super::within::ray_within;
 use super::{
-    Closest, Crossing, Point, Ray, Triangle, UNIT_ROUNDOFF, dot, point_distance, subtract,
-    triangle_distance_apart, triangles_within,
+    Closest, Crossing, Point, Ray, Triangle, UNIT_ROUNDOFF, dot, point_distance, subtract, triangle_distance,
+    triangles_within,
 };
 
 /// How often an interval of the parameter is halved: more often than an f64 has digits.
@@ -60,7 +60,7 @@ impl Along<'_> {
     /// Returns whether the ray comes within the radius, exactly. The part up to `end` decides.
     fn is_hit(&self, until: f64, end: f64) -> bool {
         let last = self.point(end);
-        let closest = triangle_distance_apart(self.triangle, &[self.ray.origin, last, last]);
+        let closest = triangle_distance(self.triangle, &[self.ray.origin, last, last]);
         let error = self.error(end, &last);
         if closest.lower - error > self.radius * (1.0 + 4.0 * UNIT_ROUNDOFF) {
             return false;

@@ -4,7 +4,7 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::isa::{Isa, Task};
-use crate::narrow::{Closest, Triangle, triangle_distance};
+use crate::narrow::{Closest, Triangle, triangle_distance_with};
 use crate::pose::Pose;
 use crate::query::placed_pair::PlacedPair;
 use bvh_format::leaf::PACKET;
@@ -63,15 +63,15 @@ pub(super) fn stored_at(bvh: &Bvh, object: &Object, place: TrianglePlace) -> Res
     stored(bvh, object, leaf, place.lane)
 }
 
-/// Runs `triangle_distance` with the features of a backend: its 42 candidates fill vector registers.
+/// Computes `triangle_distance` with the features of a backend.
 pub(super) struct TriangleDistance<'a>(pub(super) &'a Triangle, pub(super) &'a Triangle);
 
 impl Task for TriangleDistance<'_> {
     type Output = Closest;
 
     #[inline(always)]
-    fn run<I: Isa>(self, _isa: I) -> Closest {
-        triangle_distance(self.0, self.1)
+    fn run<I: Isa>(self, isa: I) -> Closest {
+        triangle_distance_with(isa, self.0, self.1)
     }
 }
 

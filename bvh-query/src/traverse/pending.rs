@@ -4,8 +4,9 @@
 //! neither moved nor sorted, and no branch depends on their number. In a depth-first walk, the last test is next. In a
 //! best-first walk, the test with the least bound is next.
 
-use crate::isa::Isa;
+use crate::isa::{Isa, in_order};
 use crate::traverse::node_cache::ChildRef;
+use std::hint::select_unpredictable;
 
 /// A pair of nodes to visit, and a lower bound of their distance; see `Measure`.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -48,16 +49,6 @@ struct PendingTest {
     tested: Tested,
     /// The lanes of the pairs that are left.
     left: u16,
-    /// The lane to take next.
-    next: u32,
-}
-
-impl PendingTest {
-    /// Returns the bound of the next pair.
-    #[inline(always)]
-    fn bound(&self) -> f32 {
-        self.tested.bounds[self.next as usize & 15]
-    }
 }
 
 /// The tests that still have pairs to visit.
@@ -65,6 +56,8 @@ impl PendingTest {
 pub(crate) struct PendingTests {
     /// At least one longer than `len`, once room has been asked for.
     tests: Vec<PendingTest>,
+    /// The place of each test in the order of visits: `nearest` of its pairs. As long as `tests`.
+    keys: Vec<i32>,
     len: usize,
 }
 
@@ -89,14 +82,18 @@ impl PendingTests {
 
     #[cold]
     fn grow(&mut self) {
-        self.tests.resize(2 * self.len + 64, PendingTest { tested: Tested::NONE, left: 0, next: 0 });
+        let length = 2 * self.len + 64;
+        self.tests.resize(length, PendingTest { tested: Tested::NONE, left: 0 });
+        self.keys.resize(length, 0);
     }
 
-    /// Keeps the test in `room`, unless no pairs are left. The pair in lane `first` comes first.
+    /// Keeps the test in `room`, unless no pairs are left. The pair in the lane of `key` comes first.
     #[inline(always)]
-    pub(crate) fn push(&mut self, left: u16, first: u32) {
-        if let Some(test) = self.tests.get_mut(self.len) {
-            (test.left, test.next) = (left, first);
+    pub(crate) fn push(&mut self, left: u16, key: i32) {
+        if let Some(test) = self.tests.get_mut(self.len)
+            && let Some(to) = self.keys.get_mut(self.len)
+        {
+            (test.left, *to) = (left, key);
             self.len += usize::from(left != 0);
         }
     }
@@ -106,7 +103,7 @@ impl PendingTests {
     pub(crate) fn push_one(&mut self, entry: Entry) {
         let room = self.room();
         (room.bounds[0], room.a, room.b) = (entry.bound, entry.a, entry.b);
-        self.push(1, 0);
+        self.push(1, in_order(entry.bound) & !15);
     }
 
     /// Takes the next pair of the last test, and finds the nearest of those that are left. Nothing waits for this until
@@ -114,20 +111,29 @@ impl PendingTests {
     #[inline(always)]
     pub(crate) fn pop<I: Isa>(&mut self, isa: I) -> Option<Entry> {
         let last = self.len.checked_sub(1)?;
-        let test = &mut self.tests[last];
-        let entry = test.tested.entry(test.next);
-        test.left &= !(1 << (test.next & 15));
-        test.next = isa.least(&test.tested.bounds, test.left);
-        self.len -= usize::from(test.left == 0);
+        let (entry, is_last) = self.take(isa, last);
+        self.len -= usize::from(is_last);
         Some(entry)
     }
 
-    /// Drops tests from the end until the next pair is within a limit. Each test's next pair is its nearest, so a test whose
-    /// next pair is beyond the limit has none within it.
+    /// Takes the next pair of a test, and returns whether it was the last one that was left.
+    #[inline(always)]
+    fn take<I: Isa>(&mut self, isa: I, at: usize) -> (Entry, bool) {
+        let (test, key) = (&mut self.tests[at], &mut self.keys[at]);
+        let entry = test.tested.entry(*key as u32 & 15);
+        test.left &= !(1 << (*key & 15));
+        *key = isa.nearest(&test.tested.bounds, test.left);
+        (entry, test.left == 0)
+    }
+
+    /// Drops tests from the end until the next pair may be within a limit. Each test's next pair is its nearest, so a test
+    /// whose next pair is beyond the limit has none within it.
     #[inline(always)]
     pub(crate) fn drop_beyond(&mut self, limit: f32) {
+        // Adding zero takes the sign from a zero.
+        let limit = in_order(limit + 0.0) | 15;
         while let Some(last) = self.len.checked_sub(1)
-            && self.tests[last].bound() > limit
+            && self.keys[last] > limit
         {
             self.len = last;
         }
@@ -136,20 +142,56 @@ impl PendingTests {
     /// Takes the pair of least bound, if each test's next pair is its nearest. The order of the tests changes.
     #[inline(always)]
     pub(crate) fn pop_least<I: Isa>(&mut self, isa: I) -> Option<Entry> {
-        self.nearest_last();
-        self.pop(isa)
+        if self.len == 0 {
+            return None;
+        }
+        let at = self.nearest();
+        let (entry, is_last) = self.take(isa, at);
+        if is_last {
+            self.len -= 1;
+            self.tests[at] = self.tests[self.len];
+            self.keys[at] = self.keys[self.len];
+        }
+        Some(entry)
+    }
+
+    /// Returns the test whose next pair has the least bound; of equal ones, the first. There is at least one test.
+    #[inline(always)]
+    fn nearest(&self) -> usize {
+        // The last keys have just been stored, one by one. A register of them would have to wait until they are in the cache.
+        let (chunks, last) = self.keys[..self.len].split_at((self.len.saturating_sub(1)) & !15);
+        let chunks = chunks.as_chunks::<16>().0;
+        let mut least = [i32::MAX; 16];
+        for chunk in chunks {
+            for lane in 0..16 {
+                least[lane] = least[lane].min(chunk[lane]);
+            }
+        }
+        let least = least.iter().chain(last).fold(i32::MAX, |least, &key| least.min(key));
+        for (number, chunk) in chunks.iter().enumerate() {
+            let mut found = 0u16;
+            for lane in 0..16 {
+                found |= u16::from(chunk[lane] == least) << lane;
+            }
+            if found != 0 {
+                return 16 * number + found.trailing_zeros() as usize;
+            }
+        }
+        let mut place = self.len - 1;
+        for at in (16 * chunks.len()..self.len - 1).rev() {
+            place = select_unpredictable(self.keys[at] == least, at, place);
+        }
+        place
     }
 
     /// Moves the test whose next pair has the least bound to the end.
     #[inline(always)]
     pub(crate) fn nearest_last(&mut self) {
-        let Some(last) = self.len.checked_sub(1) else { return };
-        let (mut place, mut least) = (last, self.tests[last].bound());
-        for (at, test) in self.tests[..last].iter().enumerate() {
-            let bound = test.bound();
-            (place, least) = if bound < least { (at, bound) } else { (place, least) };
+        if let Some(last) = self.len.checked_sub(1) {
+            let nearest = self.nearest();
+            self.tests.swap(nearest, last);
+            self.keys.swap(nearest, last);
         }
-        self.tests.swap(place, last);
     }
 
     /// Returns the number of tests.
@@ -162,10 +204,86 @@ impl PendingTests {
     #[inline(always)]
     pub(crate) fn keep_nearest(&mut self, start: usize) {
         for at in start + 1..self.len {
-            if self.tests[at].bound() < self.tests[start].bound() {
+            if self.keys[at] < self.keys[start] {
                 self.tests.swap(start, at);
+                self.keys.swap(start, at);
             }
         }
         self.len = self.len.min(start + 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::isa::{Backend, Task};
+    use cbvh_testkit::Random;
+
+    /// What is left, by bound, in a walk of random tests that is checked against a list of all pairs.
+    struct Walk<'a>(&'a mut Random, bool);
+
+    impl Task for Walk<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<I: Isa>(self, isa: I) {
+            let Self(random, is_best_first) = self;
+            let (mut pending, mut expected) = (PendingTests::default(), Vec::<(f32, u32, u32)>::new());
+            let mut number = 0;
+            for _ in 0..400 {
+                if random.below(3) > 0 {
+                    number += 1;
+                    let mut bounds = [0.0; 16];
+                    for bound in &mut bounds {
+                        // Some are equal, and some differ in the last bits only.
+                        let whole = random.below(40) as f32 - 15.0;
+                        *bound = f32::from_bits(whole.to_bits() + random.below(3) as u32);
+                    }
+                    let left = random.bits() as u16 & random.bits() as u16;
+                    let room = pending.room();
+                    (room.bounds, room.a, room.b) =
+                        (bounds, ChildRef::new(number, 0), ChildRef::new(number, 0));
+                    pending.push(left, isa.nearest(&bounds, left));
+                    for lane in (0..16).filter(|lane| left >> lane & 1 == 1) {
+                        let child = |at: usize| ChildRef::new(number, at).bits();
+                        expected.push((bounds[lane], child(lane / 4), child(lane % 4)));
+                    }
+                }
+                if !is_best_first && random.below(8) == 0 {
+                    let limit = [random.below(40) as f32 - 15.0, -0.0][random.below(2)];
+                    pending.drop_beyond(limit);
+                    // Only pairs beyond the limit are gone: what is left is popped below.
+                    expected.retain(|pair| pair.0 <= limit || is_left(&pending, pair));
+                }
+                let found = if is_best_first { pending.pop_least(isa) } else { pending.pop(isa) };
+                assert_eq!(found.is_none(), expected.is_empty());
+                let Some(found) = found else { continue };
+                let pair = (found.bound, found.a.bits(), found.b.bits());
+                let at = expected.iter().position(|left| *left == pair).expect("a pair that is left");
+                if is_best_first {
+                    let least = expected.iter().map(|pair| pair.0).min_by(f32::total_cmp).unwrap();
+                    assert!(in_order(pair.0) >> 4 <= in_order(least) >> 4, "{pair:?} {least}");
+                }
+                expected.swap_remove(at);
+            }
+        }
+    }
+
+    fn is_left(pending: &PendingTests, (_, a, b): &(f32, u32, u32)) -> bool {
+        let of = |at: u32| ChildRef::from_bits(at);
+        pending.tests[..pending.len].iter().any(|test| {
+            let lane = 4 * of(*a).child() + of(*b).child();
+            test.tested.a.node() == of(*a).node() && test.left >> lane & 1 == 1
+        })
+    }
+
+    #[test]
+    fn no_pair_is_lost_and_the_nearest_comes_first() {
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            let random = &mut Random::new(8);
+            for round in 0..50 {
+                backend.run(Walk(random, round % 2 == 0));
+            }
+        }
     }
 }

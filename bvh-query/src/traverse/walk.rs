@@ -579,13 +579,13 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     mask &= !leaves;
                 }
                 let first = match order {
-                    Order::Any => mask.trailing_zeros(),
-                    _ => isa.least(&tested.bounds, mask),
+                    Order::Any => mask.trailing_zeros() as i32,
+                    _ => isa.nearest(&tested.bounds, mask),
                 };
                 match phase {
                     Phase::DepthFirst => stack.push(mask, first),
                     Phase::BestFirst => list.push(mask, first),
-                    Phase::Dive => stack.push(mask & 1u16.unbounded_shl(first), first),
+                    Phase::Dive => stack.push(mask & 1u16 << (first & 15), first),
                 }
                 stage.leave();
                 self.tests += 1;

@@ -1,8 +1,9 @@
 //! The AVX2 backend: two registers of 8 lanes hold 16 lanes, and an SSE register holds 4.
 //!
 //! All `unsafe` here rests on one fact: only `detect` creates an `Avx2`, after it has found the features below on
-//! the CPU, and a `Y` or `X` can be made only with an `Avx2`.
+//! the CPU, and a `Y`, `X` or `D` can be made only with an `Avx2`.
 
+use super::corners::Corners;
 use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
 use bvh_format::slabs::Group;
 use bvh_format::treelet::SHORT_CODES;
@@ -19,6 +20,10 @@ pub(crate) struct Y(__m256, __m256);
 /// Four lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct X(__m128);
+
+/// Four lanes of `f64`, for three corners.
+#[derive(Clone, Copy)]
+pub(crate) struct D(__m256d);
 
 impl Avx2 {
     /// Returns the token if the CPU has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
@@ -125,11 +130,68 @@ impl Lanes for X {
     }
 }
 
+impl D {
+    /// # Safety
+    /// The CPU has AVX2.
+    #[inline(always)]
+    pub(crate) unsafe fn new([x, y, z]: [f64; 3]) -> Self {
+        Self(with_features!(_mm256_setr_pd(x, y, z, z)))
+    }
+}
+
+impl Corners for D {
+    type Mask = D;
+
+    by_intrinsics! {
+        (0)
+        add(other) _mm256_add_pd;
+        sub(other) _mm256_sub_pd;
+        mul(other) _mm256_mul_pd;
+        div(other) _mm256_div_pd;
+        min(other) _mm256_min_pd;
+        max(other) _mm256_max_pd;
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(with_features!(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> D {
+        Self(with_features!(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)))
+    }
+    #[inline(always)]
+    fn and(mask: D, other: D) -> D {
+        Self(with_features!(_mm256_and_pd(mask.0, other.0)))
+    }
+    #[inline(always)]
+    fn select(mask: D, yes: Self, no: Self) -> Self {
+        Self(with_features!(_mm256_blendv_pd(no.0, yes.0, mask.0)))
+    }
+    #[inline(always)]
+    fn of(&self, corner: usize) -> f64 {
+        // A register in memory is its lanes, one after another.
+        let lanes = std::ptr::from_ref(&self.0).cast::<[f64; 4]>();
+        with_features!((*lanes)[corner & 3])
+    }
+    #[inline(always)]
+    fn all(self) -> [f64; 3] {
+        let mut lanes = [0.0; 4];
+        with_features!(_mm256_storeu_pd(lanes.as_mut_ptr(), self.0));
+        let [x, y, z, _] = lanes;
+        [x, y, z]
+    }
+}
+
 impl Isa for Avx2 {
     type V = Y;
     type H = X;
+    type C = D;
     type Rows<'a> = &'a Group;
 
+    #[inline(always)]
+    fn corners(self, from: [f64; 3]) -> D {
+        with_features!(D::new(from))
+    }
     #[inline(always)]
     fn splat(self, value: f32) -> Y {
         with_features!(Y(_mm256_set1_ps(value), _mm256_set1_ps(value)))
@@ -277,6 +339,20 @@ impl Isa for Avx2 {
         })
     }
     #[inline(always)]
+    fn nearest(self, of: &[f32; 16], mask: u16) -> i32 {
+        with_features!({
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let first = keys(_mm256_loadu_si256(of.as_ptr().cast()), lanes, mask & 0xff);
+            let lanes = _mm256_setr_epi32(8, 9, 10, 11, 12, 13, 14, 15);
+            let last = keys(_mm256_loadu_si256(of.as_ptr().add(8).cast()), lanes, mask >> 8);
+            let half = _mm256_min_epi32(first, last);
+            let four = _mm_min_epi32(_mm256_castsi256_si128(half), _mm256_extracti128_si256::<1>(half));
+            let two = _mm_min_epi32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
+            let one = _mm_min_epi32(two, _mm_shuffle_epi32::<0b10_11_00_01>(two));
+            _mm_cvtsi128_si32(one)
+        })
+    }
+    #[inline(always)]
     fn prefetch_line(self, byte: &u8) {
         with_features!(_mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(byte).cast()));
     }
@@ -361,5 +437,18 @@ fn coordinates_of_eight(integers: &[i32; 8], unit: Option<f64>) -> __m256 {
                 _mm256_set_m128(_mm256_cvtpd_ps(_mm256_mul_pd(high, unit)), low)
             }
         }
+    })
+}
+
+/// The keys of `nearest` for eight numbers, the largest integer where bits are not set.
+#[inline(always)]
+fn keys(bits: __m256i, lanes: __m256i, mask: u16) -> __m256i {
+    with_features!({
+        let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+        let sign = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(bits));
+        let keys = _mm256_and_si256(_mm256_xor_si256(bits, sign), _mm256_set1_epi32(!15));
+        let keys = _mm256_or_si256(keys, lanes);
+        let chosen = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(i32::from(mask)), bit), bit);
+        _mm256_blendv_epi8(_mm256_set1_epi32(i32::MAX), keys, chosen)
     })
 }

@@ -3,7 +3,7 @@
 //! All `unsafe` here rests on one fact: only `detect` creates an `Avx512`, after it has found the features below on
 //! the CPU, and a `Z` or `X` can be made only with an `Avx512`.
 
-use super::avx2::short_codes;
+use super::avx2::{D, short_codes};
 use super::{FourRows, Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
 use std::arch::x86_64::*;
@@ -124,10 +124,15 @@ impl Lanes for X {
 impl Isa for Avx512 {
     type V = Z;
     type H = X;
+    type C = D;
     /// The lower and upper ends of four sets of slabs: the axes, the cube's diagonals, and two halves of its faces'
     /// diagonals.
     type Rows<'a> = [[Z; 2]; 4];
 
+    #[inline(always)]
+    fn corners(self, from: [f64; 3]) -> D {
+        with_features!(D::new(from))
+    }
     #[inline(always)]
     fn splat(self, value: f32) -> Z {
         Z(with_features!(_mm512_set1_ps(value)))
@@ -276,6 +281,23 @@ impl Isa for Avx512 {
             let of = _mm512_loadu_ps(of.as_ptr());
             let least = _mm512_mask_reduce_min_ps(mask, of);
             _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(mask, of, _mm512_set1_ps(least)).trailing_zeros()
+        })
+    }
+    #[inline(always)]
+    fn nearest(self, of: &[f32; 16], mask: u16) -> i32 {
+        with_features!({
+            let bits = _mm512_loadu_si512(of.as_ptr().cast());
+            let sign = _mm512_srli_epi32::<1>(_mm512_srai_epi32::<31>(bits));
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            // (bits ^ sign) & !15 | lanes
+            let keys = _mm512_xor_si512(bits, sign);
+            let keys = _mm512_ternarylogic_epi32::<0xec>(keys, lanes, _mm512_set1_epi32(!15));
+            let keys = _mm512_mask_blend_epi32(mask, _mm512_set1_epi32(i32::MAX), keys);
+            let half = _mm256_min_epi32(_mm512_castsi512_si256(keys), _mm512_extracti64x4_epi64::<1>(keys));
+            let four = _mm_min_epi32(_mm256_castsi256_si128(half), _mm256_extracti128_si256::<1>(half));
+            let two = _mm_min_epi32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
+            let one = _mm_min_epi32(two, _mm_shuffle_epi32::<0b10_11_00_01>(two));
+            _mm_cvtsi128_si32(one)
         })
     }
     #[inline(always)]

@@ -1,5 +1,6 @@
 //! The portable backend: arrays, one element at a time. It defines the results of the other backends.
 
+use super::corners::Three;
 use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
 use bvh_format::ordered::from_ordered;
 use bvh_format::quantize::round_step_up;
@@ -91,8 +92,13 @@ impl<const N: usize> Lanes for Array<N> {
 impl Isa for Scalar {
     type V = Array<16>;
     type H = Array<4>;
+    type C = Three;
     type Rows<'a> = &'a Group;
 
+    #[inline(always)]
+    fn corners(self, from: [f64; 3]) -> Three {
+        Three::new(from)
+    }
     #[inline(always)]
     fn splat(self, value: f32) -> Array<16> {
         Array([value; 16])

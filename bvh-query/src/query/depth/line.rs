@@ -16,7 +16,7 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance_apart};
+use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
 use crate::pose::Pose;
 use crate::query::answers::{Distance, Relation};
 use crate::query::depth::leaving::Leaving;
@@ -113,7 +113,7 @@ impl<'a> Line<'a> {
         let until = leaving.touches_until?;
         let [a, b] = leaving.last;
         let moved = |by: f64| b.map(|corner| [0, 1, 2].map(|k| corner[k] + by * self.direction[k]));
-        let point = triangle_distance_apart(&a, &moved(until)).point_a;
+        let point = triangle_distance(&a, &moved(until)).point_a;
         Some(LastContact { normal: leaving.normal, point, triangles: [a, moved(-at)] })
     }
 

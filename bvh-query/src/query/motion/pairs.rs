@@ -3,7 +3,10 @@
 
 use crate::isa::{Isa, Task};
 use crate::motion::RigidPath;
-use crate::narrow::{Closest, Point, Triangle, cross, dot, subtract, triangle_distance, triangles_within};
+use crate::narrow::{
+    Closest, Point, Triangle, cross, dot, subtract, triangle_distance_with, triangles_intersect,
+    triangles_within,
+};
 use crate::pose::Pose;
 use crate::query::exact::placed;
 use crate::query::motion::question::{Question, Stretch};
@@ -54,14 +57,14 @@ impl Sweep {
     /// Returns whether a simple test shows that two triangles are farther apart than the limit all the time: by their
     /// boxes, the normals of both, or the line between their closest points in the middle.
     #[inline(always)]
-    fn sets_apart(&self, pair: &SweptPair) -> bool {
+    fn sets_apart<I: Isa>(&self, isa: I, pair: &SweptPair) -> bool {
         let ends = [placed(&pair.b, &self.start), placed(&pair.b, &self.end)];
         box_gap(&pair.a, ends.as_flattened()) > self.limit || {
             let middle = placed(&pair.b, &self.middle);
             self.is_apart_along(normal(&pair.a), &pair.a, &ends)
                 || self.is_apart_along(normal(&middle), &pair.a, &ends)
                 || {
-                    let Closest { point_a, point_b, .. } = triangle_distance(&pair.a, &middle);
+                    let Closest { point_a, point_b, .. } = triangle_distance_with(isa, &pair.a, &middle);
                     self.is_apart_along(subtract(point_b, point_a), &pair.a, &ends)
                 }
         }
@@ -141,9 +144,15 @@ impl Task for CountApart<'_> {
     type Output = usize;
 
     #[inline(always)]
-    fn run<I: Isa>(self, _isa: I) -> usize {
+    fn run<I: Isa>(self, isa: I) -> usize {
         let Self(sweep, pairs) = self;
-        pairs.iter().position(|pair| !sweep.sets_apart(pair)).unwrap_or(pairs.len())
+        // A closure would be compiled without the features of the backend.
+        for (number, pair) in pairs.iter().enumerate() {
+            if !sweep.sets_apart(isa, pair) {
+                return number;
+            }
+        }
+        pairs.len()
     }
 }
 
@@ -154,17 +163,22 @@ impl Task for AnyWithin<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<I: Isa>(self, _isa: I) -> bool {
+    fn run<I: Isa>(self, isa: I) -> bool {
         let Self(pairs, pose, d) = self;
-        pairs.iter().any(|pair| {
+        for pair in pairs {
             let b = placed(&pair.b, pose);
             // A rounded gap exceeds d only if the exact one does.
-            if box_gap(&pair.a, &b) > d {
-                return false;
+            let within = box_gap(&pair.a, &b) <= d
+                && if d == 0.0 {
+                    triangles_intersect(&pair.a, &b)
+                } else {
+                    triangles_within(&pair.a, &b, &triangle_distance_with(isa, &pair.a, &b), d)
+                };
+            if within {
+                return true;
             }
-            let closest = triangle_distance(&pair.a, &b);
-            if d == 0.0 { closest.distance == 0.0 } else { triangles_within(&pair.a, &b, &closest, d) }
-        })
+        }
+        false
     }
 }
 
@@ -179,12 +193,12 @@ struct ContactTime<'a> {
 
 impl ContactTime<'_> {
     #[inline(always)]
-    fn of(&self, pair: &SweptPair, before: f64) -> Option<f64> {
+    fn of<I: Isa>(&self, isa: I, pair: &SweptPair, before: f64) -> Option<f64> {
         let ([start, end], last) = (self.stretch.times, &self.stretch.poses[1]);
         let (mut time, mut pose) = (start, self.stretch.poses[0]);
         for _ in 0..MOST_STEPS {
             let b = placed(&pair.b, &pose);
-            let Closest { point_a, point_b, distance, .. } = triangle_distance(&pair.a, &b);
+            let Closest { point_a, point_b, distance, .. } = triangle_distance_with(isa, &pair.a, &b);
             let gap = distance - self.clearance;
             if gap <= 0.0 {
                 return Some(time);
@@ -211,10 +225,10 @@ impl Task for ContactTime<'_> {
     type Output = Option<f64>;
 
     #[inline(always)]
-    fn run<I: Isa>(self, _isa: I) -> Option<f64> {
+    fn run<I: Isa>(self, isa: I) -> Option<f64> {
         let mut earliest = None;
         for pair in self.pairs {
-            earliest = self.of(pair, earliest.unwrap_or(self.stretch.times[1])).or(earliest);
+            earliest = self.of(isa, pair, earliest.unwrap_or(self.stretch.times[1])).or(earliest);
         }
         earliest
     }

@@ -1,7 +1,7 @@
 //! Whether a segment meets a mesh.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, segment_intersects, triangle_distance_apart, triangles_within};
+use crate::narrow::{Point, segment_intersects, triangle_distance, triangles_within};
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
@@ -56,7 +56,7 @@ impl LineQuestion for MeetsSegment {
         let ([from, to], Candidate { triangle, radius, .. }) = (self.ends, candidate);
         self.met |= if *radius > 0.0 {
             let segment = [from, to, to];
-            triangles_within(triangle, &segment, &triangle_distance_apart(triangle, &segment), *radius)
+            triangles_within(triangle, &segment, &triangle_distance(triangle, &segment), *radius)
         } else {
             segment_intersects(triangle, from, to)
         };
