@@ -47,6 +47,8 @@ pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "vector intrinsics; each file says why its use is sound")]
 pub(crate) mod avx512;
+#[allow(unsafe_code, reason = "asks the CPU")]
+pub(crate) mod cache;
 pub(crate) mod corners;
 #[allow(unsafe_code, reason = "registers of the CPU; each block says why it is sound")]
 pub mod floats;

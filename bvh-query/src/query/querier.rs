@@ -24,7 +24,7 @@ use crate::traverse::walk_memory::WalkMemory;
 /// - Time: a walk visits at most (t + p) * (u + q) pairs of nodes, each once, with up to four node tests or one packet
 ///   test each. Ordinary meshes need a few hundred visits. For files from strangers, limit the time further with
 ///   [`Querier::set_budget`].
-/// - Memory: 4 MiB, and at most 8 KiB for each treelet of either file that the query opens; no recursion. A page has at
+/// - Memory: 8 MiB, and at most 8 KiB for each treelet of either file that the query opens; no recursion. A page has at
 ///   most 110 treelets. The answer of [`Querier::contacts`] takes 16 bytes more per contact, and
 ///   [`Querier::patches`] up to 2 KiB.
 /// - Contacts: at most one for each pair of triangles for which the pages of both files have room, listed duplicates

@@ -52,12 +52,12 @@ impl LargeLeaves {
     pub(crate) fn are_beyond(
         &mut self,
         pair: &ObjectPair<'_>,
-        (nodes_a, nodes_b): (&NodeCache, &NodeCache),
+        nodes: &NodeCache,
         reaches: (f32, f32),
         entry: Entry,
         limit: f32,
     ) -> Result<bool, QueryError> {
-        let (node_a, node_b) = (nodes_a.get(entry.a.node()), nodes_b.get(entry.b.node()));
+        let (node_a, node_b) = (nodes.get(entry.a.node()), nodes.get(entry.b.node()));
         let (child_a, child_b) = (entry.a.child(), entry.b.child());
         let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
         let is_large = node_a.is_leaf(child_a) && extent_a > EXTENT_RATIO_TO_TEST_TRIANGLES * extent_b

@@ -6,6 +6,7 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
+use crate::isa::cache::second_level_kib;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::decode::{Parent, decode_group};
 use crate::traverse::node_filter::Reach;
@@ -23,8 +24,8 @@ use bvh_format::{FormatError, Rule};
 pub(crate) struct ChildRef(u32);
 
 impl ChildRef {
-    /// The object's root: the only child of node 0.
-    pub(crate) const ROOT: Self = Self(0);
+    /// Stands for no child.
+    pub(crate) const NONE: Self = Self(0);
 
     #[inline(always)]
     pub(crate) fn new(node: usize, child: usize) -> Self {
@@ -162,23 +163,39 @@ pub(super) fn leaf_lanes(links: &Links, part: usize) -> u16 {
     ((kinds * 0x1248) >> 12 & 0xf) as u16
 }
 
-/// The opened nodes of one side. Node 0 holds the object's root as its only child.
-///
-/// These nodes form a tree, whatever the file says, because a node is opened once, from one child of an earlier node.
-/// By the rules of the format, the tree is no larger than the object. `max_nodes` enforces this even if the bytes
-/// change after they were checked, so that every walk ends.
+/// The opened nodes of all objects that were walked lately, of whichever side. Above the root of each object is a node with the
+/// root as its only child. Node 0 stands for none.
 #[derive(Default)]
 pub(crate) struct NodeCache {
     nodes: Vec<CachedNode>,
     used: usize,
-    /// One more than the number of treelets that the object can have.
-    max_nodes: usize,
+    /// With more nodes than this, the next walk starts anew.
+    kept: usize,
     /// How often the cache has started anew.
     generation: u64,
-    /// The file and the first page of the object whose nodes these are.
-    of: Option<(u64, u32)>,
+    /// The objects whose nodes these are. An object has one place, which follows from its file and page.
+    roots: [Root; ROOTS],
+}
+
+/// An object that is walked.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Root {
+    /// The file and the first page of the object.
+    of: (u64, u32),
+    /// When the node was made: of another generation it is gone. 0 stands for none.
+    generation: u64,
+    /// The node above the root.
+    pub(crate) node: usize,
     /// Bounds on all nodes of the object.
-    reach: Reach,
+    pub(crate) reach: Reach,
+}
+
+impl Root {
+    /// Returns the object's root.
+    #[inline(always)]
+    pub(crate) fn child(&self) -> ChildRef {
+        ChildRef::new(self.node, 0)
+    }
 }
 
 /// More treelets than a page has by rule 17: its header and one anchor take two of its 64 lines, and a short treelet
@@ -186,37 +203,82 @@ pub(crate) struct NodeCache {
 const MAX_TREELETS_PER_PAGE: usize = 124;
 /// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
 const MAX_NODES: usize = 1 << 29;
-/// With more nodes than this, the next walk starts anew. What a walk reads of so many nodes with four children takes 300 KiB,
-/// less than the second-level cache of a core.
-const MAX_KEPT_NODES: usize = 512;
+/// The number of objects whose roots are found again.
+const ROOTS: usize = 32;
+
+/// With more nodes than this, the next walk starts anew; more are kept by and by. What a walk reads of a node with four children takes 600 bytes.
+const KEPT_AT_FIRST: usize = 512;
+
+/// The most nodes with which a walk starts: one for each KiB of the second-level cache, of which more than 2 MiB are not needed.
+#[inline(always)]
+fn most_kept() -> usize {
+    second_level_kib().min(2048)
+}
 
 impl NodeCache {
-    /// Starts a walk of an object. Nodes of the same object stay from the walk before, unless there are many. Returns
-    /// bounds on all nodes.
+    /// Starts a walk. Nodes stay from the walks before, unless there are many.
     #[inline(always)]
-    pub(crate) fn start<I: Isa>(&mut self, isa: I, bvh: &Bvh, object: &Object) -> Result<Reach, QueryError> {
-        let page = object.record().first_page.get();
-        if self.of != Some((bvh.identity(), page)) || self.used > MAX_KEPT_NODES {
-            let slabs = bvh.page(object, page)?.anchor_slabs(0);
-            self.reach = Reach::of(&slabs);
-            self.of = Some((bvh.identity(), page));
-            if self.nodes.is_empty() {
-                self.nodes.resize(64, CachedNode::EMPTY);
-            }
-            let root = &mut self.nodes[0];
-            root.groups[0] = spread(isa, &slabs);
-            root.turning = TurningCodes::NONE;
-            self.generation += 1;
-            root.links = Links { kinds: 1, ..Links::NONE };
-            root.page = page;
-            root.extents[0] = f32::INFINITY;
-            root.opened = [CLOSED; 8];
-            root.count = 1;
-            root.lanes = [ChildLanes::new(1, 0), ChildLanes::NONE];
-            self.used = 1;
-            self.max_nodes = max_nodes(object);
+    pub(crate) fn start(&mut self) {
+        if self.used > self.kept || self.used == 0 {
+            self.start_anew();
         }
-        Ok(self.reach)
+    }
+
+    /// Forgets all nodes. Memory that is touched first takes long, so only a cache that is used for long becomes large.
+    #[cold]
+    fn start_anew(&mut self) {
+        self.kept = (self.kept + self.kept / 8).clamp(KEPT_AT_FIRST.min(most_kept()), most_kept());
+        self.generation += 1;
+        self.used = 1;
+    }
+
+    /// Returns the root of an object.
+    #[inline(always)]
+    pub(crate) fn root<I: Isa>(&mut self, isa: I, bvh: &Bvh, object: &Object) -> Result<Root, QueryError> {
+        let of = (bvh.identity(), object.record().first_page.get());
+        let known = &self.roots[place_of(of)];
+        if known.of == of && known.generation == self.generation {
+            return Ok(*known);
+        }
+        self.make_root(isa, bvh, object, of)
+    }
+
+    #[inline(never)]
+    fn make_root<I: Isa>(
+        &mut self,
+        isa: I,
+        bvh: &Bvh,
+        object: &Object,
+        of: (u64, u32),
+    ) -> Result<Root, QueryError> {
+        let slabs = bvh.page(object, of.1)?.anchor_slabs(0);
+        let node = self.room(bvh, object)?;
+        let above = &mut self.nodes[node];
+        above.groups[0] = isa.run(Spread(&slabs));
+        above.turning = TurningCodes::NONE;
+        above.links = Links { kinds: 1, ..Links::NONE };
+        above.page = of.1;
+        above.extents[0] = f32::INFINITY;
+        above.opened = [CLOSED; 8];
+        above.count = 1;
+        above.lanes = [ChildLanes::new(1, 0), ChildLanes::NONE];
+        self.used = node + 1;
+        let root = Root { of, generation: self.generation, node, reach: Reach::of(&slabs) };
+        self.roots[place_of(of)] = root;
+        Ok(root)
+    }
+
+    /// Returns the number of the next node, for which there is room.
+    #[inline(always)]
+    fn room(&mut self, bvh: &Bvh, object: &Object) -> Result<usize, QueryError> {
+        if self.used >= self.nodes.len() {
+            if self.used >= MAX_NODES {
+                return Err(too_many(bvh, object, MAX_NODES));
+            }
+            // Not many at once, because filling them takes time in the middle of a query.
+            self.nodes.resize(self.used + 64, CachedNode::EMPTY);
+        }
+        Ok(self.used)
     }
 
     /// Returns a number that changes whenever the cache starts anew, and numbers stand for other nodes.
@@ -229,7 +291,9 @@ impl NodeCache {
         &self.nodes[node]
     }
 
-    /// Returns the number of the opened node of an inner child. For a leaf that is a node without children.
+    /// Returns the number of the opened node of an inner child. For a leaf that is a node without children. `left` is the
+    /// number of nodes that the walk may still add for the object: by the rules of the format, it never needs more than the
+    /// object can have, and with this limit every walk ends, even if the bytes change after they were checked.
     #[inline(always)]
     pub(crate) fn open<I: Isa>(
         &mut self,
@@ -237,20 +301,15 @@ impl NodeCache {
         bvh: &Bvh,
         object: &Object,
         at: ChildRef,
+        left: &mut usize,
     ) -> Result<usize, QueryError> {
         let known = self.nodes[at.node()].opened[at.child()];
         if known != CLOSED {
             return Ok(known as usize);
         }
         let _stage = Stage::Decode.enter();
-        if self.used >= self.max_nodes {
-            return Err(too_many(bvh, object, self.max_nodes));
-        }
-        if self.used == self.nodes.len() {
-            // Not many at once, because filling them takes time in the middle of a query.
-            self.nodes.resize(self.used + 64, CachedNode::EMPTY);
-        }
-        let number = self.used;
+        *left = left.checked_sub(1).ok_or_else(|| too_many(bvh, object, max_nodes(object)))?;
+        let number = self.room(bvh, object)?;
         let (before, behind) = self.nodes.split_at_mut(number);
         let parent = &mut before[at.node()];
         isa.run(DecodeNode { bvh, object, parent, child: at.child(), to: &mut behind[0] })?;
@@ -260,18 +319,36 @@ impl NodeCache {
     }
 }
 
-/// Returns one more than the number of treelets that an object can have.
+/// Returns the place of an object among the roots.
+#[inline(always)]
+fn place_of((file, page): (u64, u32)) -> usize {
+    (file.wrapping_mul(37) as usize).wrapping_add(page as usize) % ROOTS
+}
+
+/// Returns the number of treelets that an object can have.
 #[inline(always)]
 pub(super) fn max_nodes(object: &Object) -> usize {
     let pages = object.record().pages.get() as usize;
-    pages.saturating_mul(MAX_TREELETS_PER_PAGE).saturating_add(1).min(MAX_NODES)
+    pages.saturating_mul(MAX_TREELETS_PER_PAGE).min(MAX_NODES)
 }
 
 #[cold]
 pub(super) fn too_many(bvh: &Bvh, object: &Object, max_nodes: usize) -> QueryError {
     let at = bvh.layout().page_offset(object.record().first_page.get());
-    let expected = format!("at most {} treelets to open", max_nodes - 1);
+    let expected = format!("at most {max_nodes} treelets to open");
     FormatError::new(Rule::Counts, at, expected, "more").into()
+}
+
+/// Spreads the slabs of a root to a group.
+struct Spread<'a>(&'a NodeSlabs);
+
+impl Task for Spread<'_> {
+    type Output = Group;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Group {
+        spread(isa, self.0)
+    }
 }
 
 /// Decodes an inner child of an opened node.
@@ -439,25 +516,18 @@ mod tests {
     use super::*;
     use crate::isa::{Backend, Task};
 
-    struct OpenRoot<'a>(&'a Bvh, &'a mut NodeCache);
-
-    struct Start<'a>(&'a Bvh, &'a mut NodeCache);
-
-    impl Task for Start<'_> {
-        type Output = Result<Reach, QueryError>;
-
-        #[inline(always)]
-        fn run<I: Isa>(self, isa: I) -> Self::Output {
-            self.1.start(isa, self.0, &self.0.objects()[0])
-        }
-    }
+    struct OpenRoot<'a>(&'a Bvh, &'a mut NodeCache, usize);
 
     impl Task for OpenRoot<'_> {
         type Output = Result<usize, QueryError>;
 
         #[inline(always)]
         fn run<I: Isa>(self, isa: I) -> Self::Output {
-            self.1.open(isa, self.0, &self.0.objects()[0], ChildRef::ROOT)
+            let Self(bvh, nodes, mut left) = self;
+            let object = &bvh.objects()[0];
+            nodes.start();
+            let root = nodes.root(isa, bvh, object)?;
+            nodes.open(isa, bvh, object, root.child(), &mut left)
         }
     }
 
@@ -466,24 +536,30 @@ mod tests {
     fn no_more_nodes_are_opened_than_the_pages_can_hold() {
         let bytes = include_bytes!("../../../testdata/ok-plain.cbvh");
         let bvh = Bvh::from_static(bytes).unwrap();
+        assert_eq!(max_nodes(&bvh.objects()[0]), 124);
         let mut nodes = NodeCache::default();
-        Backend::Scalar.run(Start(&bvh, &mut nodes)).unwrap();
-        assert_eq!(nodes.max_nodes, 1 + 124);
-        nodes.max_nodes = 1;
-        let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)).unwrap_err();
+        let refused = Backend::Scalar.run(OpenRoot(&bvh, &mut nodes, 0)).unwrap_err();
         assert!(matches!(refused, QueryError::Damaged(error) if error.rule == Rule::Counts));
-        nodes.max_nodes = 2;
-        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok(1));
-        // A node that is opened again is the same, in the next walk as well.
-        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), Ok(1));
-        Backend::Scalar.run(Start(&bvh, &mut nodes)).unwrap();
-        assert_eq!((Backend::Scalar.run(OpenRoot(&bvh, &mut nodes)), nodes.used), (Ok(1), 2));
-        // Nodes of another file are not.
-        let other = Bvh::from_static(bytes).unwrap();
-        Backend::Scalar.run(Start(&other, &mut nodes)).unwrap();
-        assert_eq!(nodes.used, 1);
-        nodes.used = MAX_KEPT_NODES + 1;
-        Backend::Scalar.run(Start(&other, &mut nodes)).unwrap();
-        assert_eq!(nodes.used, 1);
+        assert_eq!(Backend::Scalar.run(OpenRoot(&bvh, &mut nodes, 1)), Ok(2));
+    }
+
+    #[test]
+    fn nodes_of_several_files_stay_until_there_are_many() {
+        let bytes = include_bytes!("../../../testdata/ok-plain.cbvh");
+        let files = [Bvh::from_static(bytes).unwrap(), Bvh::from_static(bytes).unwrap()];
+        let mut nodes = NodeCache::default();
+        // Node 0 is none, and each file has a node above its root.
+        for expected in [2, 4] {
+            let bvh = &files[expected / 4];
+            // A node that is known is not opened again.
+            for left in [1, 0] {
+                assert_eq!(Backend::Scalar.run(OpenRoot(bvh, &mut nodes, left)), Ok(expected));
+            }
+        }
+        assert_eq!((nodes.used, nodes.generation()), (5, 1));
+        nodes.used = nodes.kept + 1;
+        assert_eq!(Backend::Scalar.run(OpenRoot(&files[1], &mut nodes, 1)), Ok(2));
+        assert_eq!((nodes.used, nodes.generation()), (3, 2));
+        assert_eq!(Backend::Scalar.run(OpenRoot(&files[0], &mut nodes, 1)), Ok(4));
     }
 }

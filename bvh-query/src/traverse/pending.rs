@@ -17,8 +17,10 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// Both roots, with the least bound of all.
-    pub(crate) const ROOTS: Self = Self { bound: f32::NEG_INFINITY, a: ChildRef::ROOT, b: ChildRef::ROOT };
+    /// Returns the pair of both roots, with the least bound of all.
+    pub(crate) fn of_roots(a: ChildRef, b: ChildRef) -> Self {
+        Self { bound: f32::NEG_INFINITY, a, b }
+    }
 }
 
 /// The result of a node test for 16 pairs, four nodes of A against four of B: element `4 * a + b`.
@@ -32,7 +34,7 @@ pub(crate) struct Tested {
 }
 
 impl Tested {
-    pub(crate) const NONE: Self = Self { bounds: [0.0; 16], a: ChildRef::ROOT, b: ChildRef::ROOT };
+    pub(crate) const NONE: Self = Self { bounds: [0.0; 16], a: ChildRef::NONE, b: ChildRef::NONE };
 
     /// Returns the pair in a lane.
     #[inline(always)]

@@ -27,6 +27,12 @@ impl<T: Zeroable + Clone> PerNode<T> {
         (&mut self.values[node], known)
     }
 
+    /// Returns the value of a node as it is. It has one: a call of `of` has computed it.
+    #[inline(always)]
+    pub(super) fn get(&self, node: usize) -> &T {
+        &self.values[node]
+    }
+
     #[cold]
     fn grow(&mut self, node: usize) {
         self.values.resize(node + 64, T::zeroed());

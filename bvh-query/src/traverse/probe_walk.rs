@@ -265,7 +265,7 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
                 continue;
             };
             opened += 1;
-            if opened == max_nodes {
+            if opened > max_nodes {
                 return Err(too_many(bvh, object, max_nodes));
             }
             let is_kept = depth <= kept_levels(parts);

@@ -27,8 +27,8 @@ const FIRST_PAUSE: u32 = 24;
 /// The slab test of the walk under way, and what it needs of opened nodes.
 #[derive(Default)]
 pub(crate) struct SlabMemory {
-    /// The turning slabs of opened nodes, of A and of B.
-    groups: [PerNode<TurningGroup>; 2],
+    /// The turning slabs of opened nodes.
+    groups: PerNode<TurningGroup>,
     /// What the other side sees of them in this walk.
     seen: [PerWalk<Seen>; 2],
     test: Option<Box<SlabFilter>>,
@@ -75,7 +75,9 @@ pub(crate) struct TestSlabs<'a> {
     pub(crate) memory: &'a mut SlabMemory,
     pub(crate) node_filter: &'a NodeFilter,
     pub(crate) measure: Measure,
-    pub(crate) nodes: ((&'a NodeCache, usize), (&'a NodeCache, usize)),
+    pub(crate) nodes: &'a NodeCache,
+    /// The nodes of A and of B.
+    pub(crate) numbers: (usize, usize),
     pub(crate) limit: f32,
     pub(crate) tested: &'a mut Tested,
     pub(crate) mask: u16,
@@ -86,9 +88,9 @@ impl Task for TestSlabs<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> u16 {
-        let Self { memory, node_filter, measure, nodes, limit, tested, mask } = self;
-        let ((cache_a, number_a), (cache_b, number_b)) = nodes;
-        let (node_a, node_b) = (cache_a.get(number_a), cache_b.get(number_b));
+        let Self { memory, node_filter, measure, nodes, numbers: (number_a, number_b), limit, tested, mask } =
+            self;
+        let (node_a, node_b) = (nodes.get(number_a), nodes.get(number_b));
         if !node_a.turning.any() && !node_b.turning.any() {
             return mask;
         }
@@ -97,15 +99,14 @@ impl Task for TestSlabs<'_> {
             memory.prepared = memory.walk;
             prepare(test, node_filter);
         }
-        let ([groups_a, groups_b], [seen_a, seen_b]) = (&mut memory.groups, &mut memory.seen);
-        let (group_a, is_known) = groups_a.of(number_a, cache_a.generation());
-        if !is_known {
-            group_a.decode(isa, &node_a.turning, &node_a.groups[0]);
+        let (groups, [seen_a, seen_b]) = (&mut memory.groups, &mut memory.seen);
+        for (number, node) in [(number_a, node_a), (number_b, node_b)] {
+            let (group, is_known) = groups.of(number, nodes.generation());
+            if !is_known {
+                group.decode(isa, &node.turning, &node.groups[0]);
+            }
         }
-        let (group_b, is_known) = groups_b.of(number_b, cache_b.generation());
-        if !is_known {
-            group_b.decode(isa, &node_b.turning, &node_b.groups[0]);
-        }
+        let (group_a, group_b) = (groups.get(number_a), groups.get(number_b));
         let (seen_a, is_known) = seen_a.of(number_a);
         if !is_known {
             test.see_a(isa, group_a, seen_a);
@@ -114,7 +115,7 @@ impl Task for TestSlabs<'_> {
         if !is_known {
             test.see_b(isa, group_b, seen_b);
         }
-        let (a, b) = ((&*group_a, &*seen_a), (&*group_b, &*seen_b));
+        let (a, b) = ((group_a, &*seen_a), (group_b, &*seen_b));
         let left = mask & test.run(isa, measure, a, b, limit, &mut tested.bounds);
         let apart = (mask & !left).count_ones() as i32;
         memory.balance += TESTS_SAVED_PER_PAIR * apart - 1;

@@ -1,8 +1,8 @@
 //! Records what the walks of two trees meet, for tools that show the work of a query. Needs the feature `trace`.
 //!
-//! Nodes are numbered as the walk numbers them: node 0 of each side has the object's root as its only child, and each
-//! opened node has the number that `Step::Opened` gives it, until the next `Step::Objects`. The pages of the file tell
-//! what the children of a node are.
+//! Nodes are numbered as the walk numbers them: `Step::Objects` gives the number of the node that has an object's root as its only
+//! child, and `Step::Opened` that of each opened node, until the next `Step::Objects`. The pages of the file tell what the
+//! children of a node are.
 
 use crate::file::place::LeafPacket;
 use crate::traverse::node_cache::ChildRef;
@@ -12,8 +12,13 @@ use std::cell::RefCell;
 /// What a walk does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Starts to walk two objects, which have these first pages in the files of A and B.
-    Objects([u32; 2]),
+    /// Starts to walk two objects.
+    Objects {
+        /// Their first pages in the files of A and B.
+        pages: [u32; 2],
+        /// The nodes above their roots.
+        above: [u32; 2],
+    },
     /// Opens a node.
     Opened {
         /// 0 for A, 1 for B.
@@ -51,8 +56,9 @@ fn add(step: Step) {
     });
 }
 
-pub(super) fn objects(pair: &ObjectPair<'_>) {
-    add(Step::Objects([pair.object_a, pair.object_b].map(|object| object.record().first_page.get())));
+pub(super) fn objects(pair: &ObjectPair<'_>, above: [usize; 2]) {
+    let pages = [pair.object_a, pair.object_b].map(|object| object.record().first_page.get());
+    add(Step::Objects { pages, above: above.map(|node| node as u32) });
 }
 
 pub(super) fn opened(side: u8, at: ChildRef, node: usize) {
@@ -76,13 +82,13 @@ mod tests {
         let mut ask = || querier.contacts(&bvh, &bvh, &Pose::IDENTITY).map(|found| found.len());
         let (found, steps) = record(1000, &mut ask);
         let found = found.unwrap();
-        let mut opened = [vec![0], vec![0]];
+        let mut opened = [Vec::new(), Vec::new()];
         let mut packets = 0;
         for step in &steps {
             match *step {
-                Step::Objects(first) => {
-                    assert!(first.into_iter().all(|page| page < bvh.layout().page_count()));
-                    opened = [vec![0], vec![0]];
+                Step::Objects { pages, above } => {
+                    assert!(pages.into_iter().all(|page| page < bvh.layout().page_count()));
+                    opened = above.map(|node| vec![node]);
                 }
                 Step::Opened { side, parent, node, .. } => {
                     let known = &mut opened[usize::from(side)];
@@ -92,7 +98,7 @@ mod tests {
                 Step::Packets(_) => packets += 1,
             }
         }
-        assert!(matches!(steps[0], Step::Objects(_)));
+        assert!(matches!(steps[0], Step::Objects { .. }));
         assert!(packets > 0 && found > 0);
         // Outside of `record`, nothing is kept; and no more than asked for.
         assert_eq!(ask().unwrap(), found);

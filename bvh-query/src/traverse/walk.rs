@@ -29,7 +29,7 @@ use crate::isa::{Isa, Task};
 use crate::traverse::budget::Budget;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
-use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache};
+use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache, Root, max_nodes};
 use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
 use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
@@ -128,8 +128,12 @@ const NODE_TESTS_BEFORE_TRIANGLE_BOUNDS: u64 = 128;
 #[derive(Default)]
 pub(crate) struct PairMemory {
     node_filter: Box<NodeFilter>,
-    nodes_a: NodeCache,
-    nodes_b: NodeCache,
+    /// Of both sides.
+    nodes: NodeCache,
+    /// The roots of A and of B.
+    roots: (Root, Root),
+    /// How many nodes the walk may still add for A and for B.
+    left: (usize, usize),
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.
     aligned_a: PerWalk<[Group; 2]>,
     /// The groups of B's opened nodes along A's directions.
@@ -293,20 +297,26 @@ impl PairMemory {
     /// Starts a walk.
     #[inline(always)]
     fn start<I: Isa>(&mut self, isa: I, pair: &ObjectPair<'_>, sweeps: bool) -> Result<(), QueryError> {
-        #[cfg(feature = "trace")]
-        trace::objects(pair);
         let _stage = Stage::Prepare.enter();
         self.walk += 1;
         self.stack.clear();
         self.leaf_pairs.clear();
         self.list.clear();
         self.large_leaves.start();
-        let reach_a = self.nodes_a.start(isa, pair.bvh_a, pair.object_a)?;
-        let reach_b = self.nodes_b.start(isa, pair.bvh_b, pair.object_b)?;
+        self.nodes.start();
+        let root_a = self.nodes.root(isa, pair.bvh_a, pair.object_a)?;
+        // If it takes the place of A's, the node above A's is there as before.
+        let root_b = self.nodes.root(isa, pair.bvh_b, pair.object_b)?;
+        self.roots = (root_a, root_b);
+        #[cfg(feature = "trace")]
+        trace::objects(pair, [root_a.node, root_b.node]);
+        self.left = (max_nodes(pair.object_a), max_nodes(pair.object_b));
         self.aligned_a.start(self.walk);
         self.aligned_b.start(self.walk);
+        // The node above B's root meets no other node, but has a place.
+        self.aligned_b.of(root_b.node);
         self.slabs.start(self.walk, pair);
-        self.node_filter.prepare(isa, pair, (reach_a, reach_b));
+        self.node_filter.prepare(isa, pair, (root_a.reach, root_b.reach));
         if sweeps {
             // What else bounds a pair knows of one placement only.
             self.node_filter.prepare_end(isa, pair.end);
@@ -318,7 +328,7 @@ impl PairMemory {
     /// Returns both leaf packets, if the entry is a pair of them.
     #[inline(always)]
     fn leaf_pair(&self, entry: Entry) -> Option<(LeafPacket, LeafPacket)> {
-        let (a, b) = (self.nodes_a.get(entry.a.node()), self.nodes_b.get(entry.b.node()));
+        let (a, b) = (self.nodes.get(entry.a.node()), self.nodes.get(entry.b.node()));
         if !a.is_leaf(entry.a.child()) | !b.is_leaf(entry.b.child()) {
             return None;
         }
@@ -336,10 +346,12 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     #[inline(always)]
     fn visit_all<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
         let mut best_first_leaves = 0;
-        self.memory.stack.push_one(Entry::ROOTS);
+        let (root_a, root_b) = &self.memory.roots;
+        let roots = Entry::of_roots(root_a.child(), root_b.child());
+        self.memory.stack.push_one(roots);
         if self.phase() == Phase::Dive {
             // What follows the dive starts at the roots again.
-            self.memory.list.push_one(Entry::ROOTS);
+            self.memory.list.push_one(roots);
         }
         loop {
             let stage = Stage::Choose.enter();
@@ -461,26 +473,20 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             return Ok(false);
         }
         let _stage = Stage::LargeLeaf.enter();
-        let PairMemory { node_filter, nodes_a, nodes_b, large_leaves, .. } = &mut *self.memory;
-        large_leaves.are_beyond(
-            &self.pair,
-            (nodes_a, nodes_b),
-            node_filter.reaches(),
-            entry,
-            gap_limit::<W>(self.limit),
-        )
+        let PairMemory { node_filter, nodes, large_leaves, .. } = &mut *self.memory;
+        large_leaves.are_beyond(&self.pair, nodes, node_filter.reaches(), entry, gap_limit::<W>(self.limit))
     }
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
     #[inline(always)]
     fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<[Side; 2], QueryError> {
         let (pair, tests) = (&self.pair, self.tests);
-        let PairMemory { node_filter, nodes_a, nodes_b, aligned_b, .. } = &mut *self.memory;
+        let PairMemory { node_filter, nodes, left, aligned_b, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
             let _stage = Stage::PrepareAlongB.enter();
             node_filter.look_along_b(isa);
         }
-        let (node_a, node_b) = (nodes_a.get(entry.a.node()), nodes_b.get(entry.b.node()));
+        let (node_a, node_b) = (nodes.get(entry.a.node()), nodes.get(entry.b.node()));
         let (child_a, child_b) = (entry.a.child(), entry.b.child());
         let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
         let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
@@ -491,20 +497,20 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         let b_is_small = (extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b) & !a_is_small;
         // One branch each, as far as a processor can predict any.
         if !leaf_a & (leaf_b | !a_is_small) {
-            let number = nodes_a.open(isa, pair.bvh_a, pair.object_a, entry.a)?;
+            let number = nodes.open(isa, pair.bvh_a, pair.object_a, entry.a, &mut left.0)?;
             #[cfg(feature = "trace")]
             trace::opened(0, entry.a, number);
-            side_a = Side::opened(number, nodes_a.get(number).count);
+            side_a = Side::opened(number, nodes.get(number).count);
         }
         if !leaf_b & (leaf_a | !b_is_small) {
-            let number = nodes_b.open(isa, pair.bvh_b, pair.object_b, entry.b)?;
+            let number = nodes.open(isa, pair.bvh_b, pair.object_b, entry.b, &mut left.1)?;
             #[cfg(feature = "trace")]
             trace::opened(1, entry.b, number);
-            side_b = Side::opened(number, nodes_b.get(number).count);
+            side_b = Side::opened(number, nodes.get(number).count);
             let (to, is_aligned) = aligned_b.of(number);
             if !is_aligned {
                 let _stage = Stage::AlignB.enter();
-                let node = nodes_b.get(number);
+                let node = nodes.get(number);
                 isa.run(AlignB { node_filter, node, to, sweeps: W::SWEEPS });
             }
         }
@@ -517,22 +523,12 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         let (measure, phase, order) = (W::MEASURE, self.phase(), self.order);
         let (limit, leaving_limit) = (gap_limit::<W>(self.limit), self.limit);
         let witness = if W::HAS_WITNESS { &self.witness } else { &None };
-        let PairMemory {
-            node_filter,
-            nodes_a,
-            nodes_b,
-            aligned_a,
-            aligned_b,
-            slabs,
-            stack,
-            leaf_pairs,
-            list,
-            ..
-        } = &mut *self.memory;
+        let PairMemory { node_filter, nodes, aligned_a, aligned_b, slabs, stack, leaf_pairs, list, .. } =
+            &mut *self.memory;
         let node_filter = &**node_filter;
         let first_new = stack.len();
-        let (side_a, side_b) = (nodes_a.get(of_a.node), nodes_b.get(of_b.node));
-        // It was computed when it was opened. Node 0 never is; both roots are opened at once, so it meets no other node.
+        let (side_a, side_b) = (nodes.get(of_a.node), nodes.get(of_b.node));
+        // It was computed when it was opened. The node above the root never is; both roots are opened at once.
         let aligned_b = aligned_b.get(of_b.node);
         for part_a in of_a.parts {
             for part_b in of_b.parts.clone() {
@@ -547,12 +543,12 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
                 if mask != 0 && slabs.are_due() {
                     let _stage = Stage::Slabs.enter();
-                    let nodes = ((&*nodes_a, of_a.node), (&*nodes_b, of_b.node));
                     mask = isa.run(TestSlabs {
                         memory: slabs,
                         node_filter,
                         measure,
                         nodes,
+                        numbers: (of_a.node, of_b.node),
                         limit,
                         tested,
                         mask,

@@ -23,23 +23,26 @@ struct Side<'a> {
     bvh: &'a Bvh,
     /// The object that is walked.
     object: Option<&'a Object>,
-    /// The page and the slot of each opened node; node 0 stands for what is above the root.
+    /// What is above the root of the object.
+    above: u32,
+    /// The page and the slot of each opened node.
     nodes: Vec<Option<(u32, u8)>>,
     opened: Counts,
     tested: Counts,
 }
 
 impl Side<'_> {
-    fn start(&mut self, first_page: u32) {
+    fn start(&mut self, first_page: u32, above: u32) {
         let objects = self.bvh.objects();
         let place = objects.binary_search_by_key(&first_page, |object| object.pages().start);
         self.object = place.ok().and_then(|place| objects.get(place));
+        self.above = above;
         self.nodes.clear();
     }
 
     fn open(&mut self, parent: u32, child: u8, node: u32) -> Option<()> {
         let object = self.object?;
-        let at = if parent == 0 {
+        let at = if parent == self.above {
             (object.pages().start, 0)
         } else {
             let (number, slot) = (*self.nodes.get(parent as usize)?)?;
@@ -88,13 +91,18 @@ pub fn visits(a: &Mesh, b: &Mesh, pose_of_b: &Float64Array, question: &str) -> A
     let mut sides = shapes.map(|shape| Side {
         bvh: shape.bvh(),
         object: None,
+        above: 0,
         nodes: Vec::new(),
         opened: Counts::new(),
         tested: Counts::new(),
     });
     for step in &steps {
         match *step {
-            Step::Objects(first) => sides.iter_mut().zip(first).for_each(|(side, page)| side.start(page)),
+            Step::Objects { pages, above } => {
+                for (side, (page, above)) in sides.iter_mut().zip(pages.into_iter().zip(above)) {
+                    side.start(page, above);
+                }
+            }
             Step::Opened { side, parent, child, node } => {
                 let _ = sides[usize::from(side & 1)].open(parent, child, node);
             }
