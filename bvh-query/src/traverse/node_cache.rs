@@ -207,7 +207,7 @@ const MAX_NODES: usize = 1 << 29;
 const ROOTS: usize = 32;
 
 /// With more nodes than this, the next walk starts anew; more are kept by and by. What a walk reads of a node with four children takes 600 bytes.
-const KEPT_AT_FIRST: usize = 512;
+const KEPT_AT_FIRST: usize = 256;
 
 /// The most nodes with which a walk starts: one for each KiB of the second-level cache, of which more than 2 MiB are not needed.
 #[inline(always)]
@@ -227,7 +227,7 @@ impl NodeCache {
     /// Forgets all nodes. Memory that is touched first takes long, so only a cache that is used for long becomes large.
     #[cold]
     fn start_anew(&mut self) {
-        self.kept = (self.kept + self.kept / 8).clamp(KEPT_AT_FIRST.min(most_kept()), most_kept());
+        self.kept = (self.kept + self.kept / 16).clamp(KEPT_AT_FIRST.min(most_kept()), most_kept());
         self.generation += 1;
         self.used = 1;
     }
