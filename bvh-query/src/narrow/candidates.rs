@@ -230,7 +230,7 @@ pub(super) fn everywhere<C: Corners>(isa: impl Isa<C = C>, [x, y, z]: Point) -> 
 }
 
 #[inline(always)]
-fn subtract<C: Corners>(p: Vectors<C>, q: Vectors<C>) -> Vectors<C> {
+pub(super) fn subtract<C: Corners>(p: Vectors<C>, q: Vectors<C>) -> Vectors<C> {
     [p[0].sub(q[0]), p[1].sub(q[1]), p[2].sub(q[2])]
 }
 
@@ -241,6 +241,6 @@ pub(super) fn dot<C: Corners>(p: Vectors<C>, q: Vectors<C>) -> C {
 
 /// Returns `p - factor * q`; each coordinate is rounded twice.
 #[inline(always)]
-fn less<C: Corners>(p: Vectors<C>, factor: C, q: Vectors<C>) -> Vectors<C> {
+pub(super) fn less<C: Corners>(p: Vectors<C>, factor: C, q: Vectors<C>) -> Vectors<C> {
     [p[0].sub(factor.mul(q[0])), p[1].sub(factor.mul(q[1])), p[2].sub(factor.mul(q[2]))]
 }

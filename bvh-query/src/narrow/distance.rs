@@ -107,7 +107,7 @@ pub(super) const MAX_ERROR_ASYMMETRY: f64 = 8.0;
 pub(super) struct Placed {
     pub(super) foot: Foot,
     /// From the corner to the next one.
-    next: Point,
+    pub(super) next: Point,
     /// To the corner from the one before.
     previous: Point,
 }

@@ -5,50 +5,52 @@
 //! This leaves 3 corners, 3 edges and the face. Each is computed by the same operations in the same order, and so are
 //! the bounds. The general routine is only needed for the search for a better lower bound, which is rare.
 
-use super::candidates::Foot;
+use super::candidates::{self as vectors, Foot, Vectors, everywhere};
 use super::distance::{
-    Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, longest, negated, perpendicular_part,
-    reciprocal_exponent, times,
+    Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, largest_of, negated, perpendicular_part,
+    reciprocal_exponent,
 };
 use super::intersect::triangle_contains;
-use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, subtract, triangle_distance};
+use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, triangle_distance};
 use crate::isa::Isa;
-use crate::isa::scalar::Scalar;
+use crate::isa::corners::Corners;
 
 /// Returns the distance of a point from a closed triangle, with bounds and the closest point.
 ///
 /// The result is that of `triangle_distance(triangle, &[point; 3])`, bit for bit.
 #[must_use]
 #[inline(always)]
-pub(crate) fn point_distance(triangle: &Triangle, point: Point) -> Closest {
-    let gaps = [subtract(point, triangle[0]), subtract(point, triangle[1]), subtract(point, triangle[2])];
-    let edges = [
-        subtract(triangle[1], triangle[0]),
-        subtract(triangle[2], triangle[1]),
-        subtract(triangle[0], triangle[2]),
-    ];
-    let size = largest(&gaps).max(largest(&edges));
+pub(crate) fn point_distance<I: Isa>(isa: I, triangle: &Triangle, point: Point) -> Closest {
+    let of = |first: usize| {
+        let (p, q, r) = (triangle[first % 3], triangle[(first + 1) % 3], triangle[(first + 2) % 3]);
+        [isa.corners([p[0], q[0], r[0]]), isa.corners([p[1], q[1], r[1]]), isa.corners([p[2], q[2], r[2]])]
+    };
+    let corners = of(0);
+    let mut gaps = vectors::subtract(everywhere(isa, point), corners);
+    let mut edges = vectors::subtract(of(1), corners);
+    let of = |v: &Vectors<I::C>| v[0].abs().max(v[1].abs()).max(v[2].abs());
+    let size = of(&gaps).max(of(&edges)).largest();
     if size == 0.0 {
         return Closest::meeting(triangle[0]);
     }
     let scale = reciprocal_exponent(size);
-    let unit = 1.0 / scale;
-    let gaps = [times(scale, gaps[0]), times(scale, gaps[1]), times(scale, gaps[2])];
-    let edges = [times(scale, edges[0]), times(scale, edges[1]), times(scale, edges[2])];
-    let foot = closest_foot(&gaps, &edges);
-    let by_axis = |t: &Triangle| [0, 1, 2].map(|axis| Scalar.corners([t[0][axis], t[1][axis], t[2][axis]]));
-    let placed = Placed::new(foot, &by_axis(&edges));
+    let (unit, by) = (1.0 / scale, isa.corners([scale; 3]));
+    for coordinate in gaps.iter_mut().chain(&mut edges) {
+        *coordinate = coordinate.mul(by);
+    }
+    let foot = closest_foot(isa, &gaps, &edges);
+    let placed = Placed::new(foot, &edges);
     let [along, across] = placed.offsets().map(negated);
-    let gap = gaps[foot.corner];
+    let gap = vectors::point(&gaps, foot.corner);
     let between = add_scaled(add_scaled(gap, 1.0, along), 1.0, across);
     let direction = if foot.across != 0.0 {
         placed.normal()
     } else if foot.along != 0.0 {
-        perpendicular_part(edges[foot.corner], between)
+        perpendicular_part(placed.next, between)
     } else {
         between
     };
-    let lower = certified_gap(Scalar, direction, &[by_axis(&gaps)]);
+    let lower = certified_gap(isa, direction, &[gaps]);
     if lower == 0.0 && triangle_contains(triangle, point) {
         return Closest::meeting(placed.place(triangle, unit));
     }
@@ -69,27 +71,20 @@ pub(crate) fn point_distance(triangle: &Triangle, point: Point) -> Closest {
     }
 }
 
-#[inline(always)]
-fn largest(vectors: &Triangle) -> f64 {
-    vectors.as_flattened().iter().fold(0.0, |size: f64, x| size.max(x.abs()))
-}
-
 /// Returns the closest point of the triangle, given what leads to the point from each corner. Ties go to the first of the
 /// corners, then of the edges, then to the face.
 #[inline(always)]
-fn closest_foot(gaps: &Triangle, edges: &Triangle) -> Foot {
-    let (mut inverse, mut along, mut perpendicular) = ([0.0; 3], [0.0; 3], [[0.0; 3]; 3]);
-    let (mut corners, mut sides) = ([0.0; 3], [0.0; 3]);
-    for i in 0..3 {
-        let (gap, edge) = (gaps[i], edges[i]);
-        let squared = dot(edge, edge);
-        inverse[i] = if squared >= f64::MIN_POSITIVE { 1.0 / squared } else { 0.0 };
-        along[i] = dot(gap, edge) * inverse[i];
-        perpendicular[i] = add_scaled(gap, -along[i], edge);
-        let inside = (along[i] > 0.0) & (along[i] < 1.0);
-        corners[i] = dot(gap, gap);
-        sides[i] = if inside { dot(perpendicular[i], perpendicular[i]) } else { f64::INFINITY };
-    }
+fn closest_foot<I: Isa>(isa: I, gaps: &Vectors<I::C>, edges: &Vectors<I::C>) -> Foot {
+    let (none, one) = (isa.corners([0.0; 3]), isa.corners([1.0; 3]));
+    let squares = vectors::dot(*edges, *edges);
+    let is_short = squares.lt(isa.corners([f64::MIN_POSITIVE; 3]));
+    let inverse = I::C::select(is_short, none, one.div(squares));
+    let along = vectors::dot(*gaps, *edges).mul(inverse);
+    let perpendicular = vectors::less(*gaps, along, *edges);
+    let inside = I::C::and(none.lt(along), along.lt(one));
+    let square = vectors::dot(perpendicular, perpendicular);
+    let corners = vectors::dot(*gaps, *gaps).all();
+    let sides = I::C::select(inside, square, isa.corners([f64::INFINITY; 3])).all();
     let (mut least, mut foot) = (corners[0], Foot::corner(0));
     for i in 1..3 {
         if corners[i] < least {
@@ -98,22 +93,23 @@ fn closest_foot(gaps: &Triangle, edges: &Triangle) -> Foot {
     }
     for i in 0..3 {
         if sides[i] < least {
-            (least, foot) = (sides[i], Foot::edge(i, along[i]));
+            (least, foot) = (sides[i], Foot::edge(i, along.of(i)));
         }
     }
-    // The longest edge is projected out first, as in `Differences::face`.
-    let base = longest(edges);
-    let (edge, apex) = (edges[base], negated(edges[(base + 2) % 3]));
-    let slope = dot(apex, edge) * inverse[base];
+    // The longest edge is projected out first, as in `Differences::closest`.
+    let base = largest_of(squares.all());
+    let (edge, apex) = (vectors::point(edges, base), negated(vectors::point(edges, (base + 2) % 3)));
+    let slope = dot(apex, edge) * inverse.of(base);
     let height = add_scaled(apex, -slope, edge);
     let whole = dot(height, height);
     if whole < f64::MIN_POSITIVE {
         return foot;
     }
-    let across = dot(perpendicular[base], height) * (1.0 / whole);
-    let along = along[base] - across * slope;
+    let to_point = vectors::point(&perpendicular, base);
+    let across = dot(to_point, height) * (1.0 / whole);
+    let along = along.of(base) - across * slope;
     if (across > 0.0) & (along > 0.0) & (across + along < 1.0) {
-        let shortest = add_scaled(perpendicular[base], -across, height);
+        let shortest = add_scaled(to_point, -across, height);
         if dot(shortest, shortest) < least {
             return Foot { corner: base, along, across };
         }

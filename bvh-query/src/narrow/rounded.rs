@@ -12,6 +12,7 @@ use super::{
     Closest, Crossing, Point, Ray, Triangle, UNIT_ROUNDOFF, dot, point_distance, subtract, triangle_distance,
     triangles_within,
 };
+use crate::isa::scalar::Scalar;
 
 /// How often an interval of the parameter is halved: more often than an f64 has digits.
 const HALVINGS: u32 = 64;
@@ -44,7 +45,7 @@ impl Along<'_> {
     #[inline(never)]
     fn value(&self, t: f64) -> Value {
         let point = self.point(t);
-        let closest = point_distance(self.triangle, point);
+        let closest = point_distance(Scalar, self.triangle, point);
         let error = self.error(t, &point);
         Value {
             closest,

@@ -1,8 +1,10 @@
 //! Compares `triangle_distance` with the oracle: value, bounds and witness points.
 
 use super::generate::{KINDS, float, grid_triangle, pair, shuffled, small};
+use crate::isa::{Backend, Isa, Task};
 use crate::narrow::{
-    Closest, Point, Triangle, add_scaled, point_distance, subtract, triangle_distance, triangles_intersect,
+    Closest, Point, Triangle, add_scaled, point_distance, subtract, triangle_distance,
+    triangle_distance_with, triangles_intersect,
 };
 use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
@@ -15,10 +17,34 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     numbers.into_iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
+/// The distance of two triangles, and that of the first corner of the second one, with the registers of a backend.
+struct Distances<'a>(&'a Triangle, &'a Triangle);
+
+impl Task for Distances<'_> {
+    type Output = [Closest; 2];
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> [Closest; 2] {
+        let Self(a, b) = self;
+        [triangle_distance_with(isa, a, b), point_distance(isa, a, b[0])]
+    }
+}
+
+/// Returns the distances, which are the same on every backend.
+#[track_caller]
+fn on_all_backends(a: &Triangle, b: &Triangle) -> [Closest; 2] {
+    let expected = Backend::Scalar.run(Distances(a, b));
+    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+        assert_eq!(backend.run(Distances(a, b)), expected, "{backend}: {a:?} {b:?}");
+    }
+    expected
+}
+
 #[track_caller]
 fn check(name: &str, a: &Triangle, b: &Triangle) -> Closest {
     let exact = Length::between(a, b);
-    let closest = triangle_distance(a, b);
+    let [closest, _] = on_all_backends(a, b);
+    assert_eq!(closest, triangle_distance(a, b));
     let Closest { distance, lower, upper, point_a, point_b } = closest;
     let context = format!("{name}: {a:?} {b:?} {closest:?}");
 
@@ -195,8 +221,7 @@ fn a_point_has_the_bits_of_a_triangle_that_is_a_point() {
         let near = add_scaled(on_edge, small(random, 17.0) * scale, random.point());
         let inside = along(on_edge, [0.25, random.unit()][random.below(2)], t[2]);
         for point in [other[0].map(|x| x * scale), t[random.below(3)], on_edge, near, inside] {
-            let expected = triangle_distance(&t, &[point; 3]);
-            let found = point_distance(&t, point);
+            let [expected, found] = on_all_backends(&t, &[point; 3]);
             assert_eq!(found, expected, "{name}: {t:?} {point:?}");
             on += u32::from(found.distance == 0.0);
             all += 1;

@@ -191,7 +191,7 @@ impl Task for SearchObject<'_> {
         bounded.clear();
         let mut visitor = Nearest::new(isa, search, placed, index, bounded);
         let tests = isa.run(memory.probe_walk(visitor.bvh, visitor.object, &mut visitor))?;
-        visitor.settle()?;
+        visitor.settle(isa)?;
         let limit = f64::from(visitor.limit) / (visitor.scale * visitor.stretch);
         let stats = visitor.stats;
         search.limit = search.limit.min(limit);
@@ -257,7 +257,7 @@ impl<'a> Nearest<'a> {
 
     /// Measures the bounded triangles that still may be the closest, nearest first.
     #[inline(always)]
-    fn settle(&mut self) -> Result<(), QueryError> {
+    fn settle<I: Isa>(&mut self, isa: I) -> Result<(), QueryError> {
         let limit = self.limit;
         self.bounded.retain(|triangle| triangle.lower <= limit);
         self.bounded.sort_unstable_by(|x, y| y.lower.total_cmp(&x.lower));
@@ -271,7 +271,7 @@ impl<'a> Nearest<'a> {
             if let Some(pose) = self.pose {
                 triangle = placed(&triangle, pose);
             }
-            let closest = point_distance(&triangle, point);
+            let closest = point_distance(isa, &triangle, point);
             let place = TrianglePlace { page: leaf.page, packet: leaf.packet, lane };
             let is_better = match &search.best {
                 // Objects come in the order of their numbers.
@@ -327,7 +327,7 @@ impl ProbeVisitor for Nearest<'_> {
             self.bounded.push(BoundedTriangle { lower: bounds.lower[at], leaf, lane });
         }
         if self.bounded.len() >= MAX_BOUNDED {
-            self.settle()?;
+            self.settle(isa)?;
         }
         Ok(())
     }
