@@ -5,7 +5,7 @@ use crate::edge::{Edge, at, parts_of, value};
 use crate::error::RobotError;
 use crate::frame::length;
 use crate::model::Kind;
-use crate::pair_path::{Interval, PairPath, ROUNDED_UP};
+use crate::pair_path::{Interval, JointPaths, PairPath, ROUNDED_UP};
 use crate::questions::bodies;
 use crate::robot::Robot;
 use crate::setting::Setting;
@@ -182,8 +182,9 @@ impl Asker {
                 }
             }
         }
+        let joints = JointPaths::new(&setting.model, edge);
         for pair in &setting.pairs {
-            let path = PairPath::new(setting, pair, edge)?;
+            let path = PairPath::new(setting, pair, &joints)?;
             let free =
                 self.is_pair_free(&path, 1.0, options).map_err(|source| failed(setting, pair, source))?;
             if !free {
@@ -247,8 +248,9 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<Option<(f64, usize)>, RobotError> {
+        let joints = JointPaths::new(&setting.model, edge);
         let paths: Result<Vec<_>, _> =
-            setting.pairs.iter().map(|pair| PairPath::new(setting, pair, edge)).collect();
+            setting.pairs.iter().map(|pair| PairPath::new(setting, pair, &joints)).collect();
         let paths = paths?;
         for sample in 0..=SAMPLES {
             let time = f64::from(sample) / f64::from(SAMPLES);
@@ -275,8 +277,9 @@ impl Asker {
         // Once a hit is known, nothing later matters.
         let (mut free_until, mut hit, mut near) = (1.0f64, None, None);
         let mut until = 1.0;
+        let joints = JointPaths::new(&setting.model, edge);
         for (number, pair) in setting.pairs.iter().enumerate() {
-            let path = PairPath::new(setting, pair, edge)?;
+            let path = PairPath::new(setting, pair, &joints)?;
             let failed = |source| failed(setting, pair, source);
             if self.is_pair_free(&path, until, options).map_err(failed)? {
                 continue;

@@ -32,10 +32,30 @@ use crate::model::{Joint, Kind, Model};
 use crate::setting::{Pair, Part, Setting};
 use bvh_query::{Pose, PoseError, RigidPath};
 
-/// The path of B in A's frame, where B is the smaller one of a pair: its points are nearer to the axes that it turns about.
-pub(crate) struct PairPath<'a> {
+/// What all pairs need of a motion of the joints, computed once: hundreds of pairs share a dozen joints.
+pub(crate) struct JointPaths<'a> {
     model: &'a Model,
     edge: &'a Edge,
+    /// How each joint turns and slides.
+    bounds: Vec<[Bounds; 2]>,
+    /// The frame of each joint's child in that of its parent in the middle of the motion.
+    middle: Vec<Frame>,
+}
+
+impl<'a> JointPaths<'a> {
+    pub(crate) fn new(model: &'a Model, edge: &'a Edge) -> Self {
+        let numbers = at(model, edge, MIDDLE);
+        let bounds = model.joints.iter().map(|joint| parts_of(&joint.kind, edge)).collect();
+        Self { model, edge, bounds, middle: model.joints.iter().map(|joint| joint.at(&numbers)).collect() }
+    }
+}
+
+/// The time in the middle of a motion.
+const MIDDLE: f64 = 0.5;
+
+/// The path of B in A's frame, where B is the smaller one of a pair: its points are nearer to the axes that it turns about.
+pub(crate) struct PairPath<'a> {
+    joints: &'a JointPaths<'a>,
     pub(crate) a: &'a Part,
     pub(crate) b: &'a Part,
     /// The sum of the radii of the balls around both.
@@ -49,17 +69,27 @@ struct Step<'a> {
     joint: &'a Joint,
     /// Whether the way leads from its parent to its child.
     is_inverse: bool,
-    turn: Bounds,
-    slide: Bounds,
+    turn: &'a Bounds,
+    slide: &'a Bounds,
+    /// The joint's frame in the middle of the motion.
+    middle: &'a Frame,
 }
 
 impl<'a> PairPath<'a> {
-    pub(crate) fn new(setting: &'a Setting, pair: &'a Pair, edge: &'a Edge) -> Result<Self, RobotError> {
-        let model = &*setting.model;
+    pub(crate) fn new(
+        setting: &'a Setting,
+        pair: &'a Pair,
+        joints: &'a JointPaths<'a>,
+    ) -> Result<Self, RobotError> {
         let step = |joint: usize, is_inverse: bool| {
-            let joint = &model.joints[joint];
-            let [turn, slide] = parts_of(&joint.kind, edge);
-            Step { joint, is_inverse, turn, slide }
+            let [turn, slide] = &joints.bounds[joint];
+            Step {
+                joint: &joints.model.joints[joint],
+                is_inverse,
+                turn,
+                slide,
+                middle: &joints.middle[joint],
+            }
         };
         let [first, second] = [pair.a, pair.b].map(|part| &setting.parts[part]);
         let ((a, b), (above_a, above_b)) = if first.radius < second.radius {
@@ -74,7 +104,7 @@ impl<'a> PairPath<'a> {
         let farthest = still(a) + still(b) + steps.iter().map(way).sum::<f64>();
         // NaN does not stay below anything.
         if farthest < MOST_REACH {
-            Ok(Self { model, edge, a, b, reach: pair.reach, steps })
+            Ok(Self { joints, a, b, reach: pair.reach, steps })
         } else {
             Err(PoseError::TooFar(farthest).into())
         }
@@ -82,7 +112,7 @@ impl<'a> PairPath<'a> {
 
     /// Returns the frame of B in A's.
     fn frame(&self, t: f64) -> Frame {
-        let numbers = at(self.model, self.edge, t);
+        let numbers = at(self.joints.model, self.joints.edge, t);
         let mut frame = self.b.origin;
         for step in &self.steps {
             let joint = step.joint.at(&numbers);
@@ -95,13 +125,20 @@ impl<'a> PairPath<'a> {
     /// of it.
     pub(crate) fn follow(&self, middle: Point, radius: f64, [t0, t1]: [f64; 2]) -> (Point, Bound) {
         let (a, b) = (self.a, self.b);
-        let numbers = at(self.model, self.edge, (t0 + t1) / 2.0);
+        let time = (t0 + t1) / 2.0;
+        let numbers = if time == MIDDLE { Vec::new() } else { at(self.joints.model, self.joints.edge, time) };
         let half = (t1 - t0).abs() / 2.0;
         let mut point = b.origin.place(middle);
         let mut reach = length(b.origin.translation) + length(middle) + radius;
         let mut bound = Bound { speed: 0.0, acceleration: 0.0, rounding: ROUNDING * reach };
-        for Step { joint, is_inverse, turn, slide } in &self.steps {
-            let frame = joint.at(&numbers);
+        for Step { joint, is_inverse, turn, slide, middle } in &self.steps {
+            let computed;
+            let frame = if time == MIDDLE {
+                *middle
+            } else {
+                computed = joint.at(&numbers);
+                &computed
+            };
             let inner = if *is_inverse { frame.find(point) } else { point };
             reach += length(joint.origin.translation) + slide.way;
             let rounding = ROUNDING * (reach * (1.0 + turn.terms) + slide.terms);
@@ -243,8 +280,9 @@ mod tests {
                     of.extend([0.5 * random.signed(), random.signed(), random.signed()]);
                 }
             }
+            let joints = JointPaths::new(&robot.setting.model, &edge);
             for pair in &robot.setting.pairs {
-                let path = PairPath::new(&robot.setting, pair, &edge).unwrap();
+                let path = PairPath::new(&robot.setting, pair, &joints).unwrap();
                 for _ in 0..4 {
                     let ratio = departure(&path, random);
                     assert!(ratio <= 1.0, "{ratio} in round {round}");
@@ -267,8 +305,9 @@ mod tests {
             robot.refresh();
             let [from, to] = [(); 2].map(|()| values(random, &robot, [0.3, 3.0][round % 2]));
             let edge = Edge::straight(&from, &to).unwrap();
+            let joints = JointPaths::new(&robot.setting.model, &edge);
             for pair in &robot.setting.pairs {
-                let path = PairPath::new(&robot.setting, pair, &edge).unwrap();
+                let path = PairPath::new(&robot.setting, pair, &joints).unwrap();
                 let long = [1.0, 0.1, 1e-3][random.below(3)];
                 let t0 = (1.0 - long) * random.unit();
                 let ([middle, off], radius) = ([random.point(), random.point()], random.unit());
