@@ -36,13 +36,6 @@ pub(crate) trait Corners: Copy {
 #[derive(Clone, Copy)]
 pub(crate) struct Three([f64; 3]);
 
-impl Three {
-    #[inline(always)]
-    pub(crate) fn new(values: [f64; 3]) -> Self {
-        Self(values)
-    }
-}
-
 /// Defines methods by what they do for a corner.
 macro_rules! by_corner {
     ($($name:ident($x:ident, $y:ident) $result:ty { $each:expr })+) => {

@@ -3,11 +3,11 @@
 //! The token of a backend has size zero and can be created only on a CPU with the backend's features. Kernels are
 //! generic over the token and `#[inline(always)]`. They are inlined into tasks, each of which is a separate function
 //! with the features of the backend enabled. A walk consists of a few tasks: in a single function of 64 KB, compilers
-//! allocate registers badly. A register has 16 lanes (`V`: four children of A against four of B) or 4 lanes (`H`: four
-//! children or triangles of one side).
+//! allocate registers badly. A register has 16 lanes (`V`: four children of A against four of B), 4 lanes (`H`: four
+//! children or triangles of one side), or 3 numbers in `f64` (`C`: the corners of a triangle).
 //!
-//! Decoding gives the same bits on every backend, because it uses exact products only. Other operations may
-//! round differently (`mul_add` is fused where the CPU supports it), so their results are used only in filters
+//! Decoding gives the same bits on every backend, because it uses exact products only, and so do operations on corners,
+//! which are not fused. Other operations may round differently (`mul_add` is fused where the CPU supports it), so their results are used only in filters
 //! with derived error bounds.
 
 /// Calls intrinsics whose features the token of a backend stands for.

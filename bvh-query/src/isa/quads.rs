@@ -134,7 +134,7 @@ impl<Q: Quad> Isa for Quads<Q> {
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> Three {
-        Three::new(from)
+        Three::from(from)
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Four<Q> {

@@ -59,23 +59,11 @@ pub(super) struct Differences<C> {
 impl<C: Corners> Differences<C> {
     #[inline(always)]
     pub(super) fn new(isa: impl Isa<C = C>, a: &Triangle, b: &Triangle) -> Self {
-        let of = |t: &Triangle, first: usize| {
-            let (p, q, r) = (t[first % 3], t[(first + 1) % 3], t[(first + 2) % 3]);
-            [
-                isa.corners([p[0], q[0], r[0]]),
-                isa.corners([p[1], q[1], r[1]]),
-                isa.corners([p[2], q[2], r[2]]),
-            ]
-        };
-        let (corners_a, corners_b) = (of(a, 0), of(b, 0));
-        let from = |p: Point, corners: Vectors<C>| subtract(corners, everywhere(isa, p));
-        let mut gaps = [from(a[0], corners_b), from(a[1], corners_b), from(a[2], corners_b)];
-        let mut back = [from(b[0], corners_a), from(b[1], corners_a), from(b[2], corners_a)];
-        let mut edges_a = subtract(of(a, 1), corners_a);
-        let mut edges_b = subtract(of(b, 1), corners_b);
-        let of = |v: &Vectors<C>| v[0].abs().max(v[1].abs()).max(v[2].abs());
-        let size =
-            of(&gaps[0]).max(of(&gaps[1])).max(of(&gaps[2])).max(of(&edges_a)).max(of(&edges_b)).largest();
+        let (mut gaps, mut back) = (gaps_from(isa, a, b), gaps_from(isa, b, a));
+        let (mut edges_a, mut edges_b) = (edges(isa, a), edges(isa, b));
+        let [from_p, from_q, from_r] = gaps;
+        let size = magnitude(from_p).max(magnitude(from_q)).max(magnitude(from_r));
+        let size = size.max(magnitude(edges_a)).max(magnitude(edges_b)).largest();
         let scale = reciprocal_exponent(size);
         let by = isa.corners([scale; 3]);
         for vectors in gaps.iter_mut().chain(&mut back).chain([&mut edges_a, &mut edges_b]) {
@@ -94,7 +82,6 @@ impl<C: Corners> Differences<C> {
     pub(super) fn closest(&self, isa: impl Isa<C = C>) -> Feet {
         let (none, one) = (isa.corners([0.0; 3]), isa.corners([1.0; 3]));
         let infinity = isa.corners([f64::INFINITY; 3]);
-        let is_between = |x: C| C::and(none.lt(x), x.lt(one));
         let smallest = isa.corners([f64::MIN_POSITIVE; 3]);
         let mut rows = [infinity; ROWS];
         for i in 0..3 {
@@ -117,7 +104,8 @@ impl<C: Corners> Differences<C> {
                 let edge = everywhere(isa, point(&edges, i));
                 let foot = dot(gaps[i], edge).mul(isa.corners([inverse.of(i); 3]));
                 let to_corner = less(gaps[i], foot, edge);
-                rows[3 + 3 * side + i] = C::select(is_between(foot), dot(to_corner, to_corner), infinity);
+                rows[3 + 3 * side + i] =
+                    C::select(is_between(isa, foot), dot(to_corner, to_corner), infinity);
                 along[3 * side + i] = foot;
                 perpendicular[3 * side + i] = to_corner;
             }
@@ -132,7 +120,7 @@ impl<C: Corners> Differences<C> {
             t[i] = none.sub(dot(from, across)).div(dot(across, across));
             s[i] = along[i].add(t[i].mul(slope));
             let shortest = less(from, none.sub(t[i]), across);
-            let inside = C::and(is_between(t[i]), is_between(s[i]));
+            let inside = C::and(is_between(isa, t[i]), is_between(isa, s[i]));
             rows[9 + i] = C::select(inside, dot(shortest, shortest), infinity);
         }
         // Of a face, the longest edge is projected out first, so what is left is the triangle's least height, which is as
@@ -227,6 +215,42 @@ pub(super) fn point<C: Corners>(of: &Vectors<C>, corner: usize) -> Point {
 #[inline(always)]
 pub(super) fn everywhere<C: Corners>(isa: impl Isa<C = C>, [x, y, z]: Point) -> Vectors<C> {
     [isa.corners([x; 3]), isa.corners([y; 3]), isa.corners([z; 3])]
+}
+
+/// Returns the corners of a triangle in lanes, from the one called `first` on.
+#[inline(always)]
+pub(super) fn corners<I: Isa>(isa: I, t: &Triangle, first: usize) -> Vectors<I::C> {
+    let (p, q, r) = (t[first % 3], t[(first + 1) % 3], t[(first + 2) % 3]);
+    [isa.corners([p[0], q[0], r[0]]), isa.corners([p[1], q[1], r[1]]), isa.corners([p[2], q[2], r[2]])]
+}
+
+/// Returns what leads from a point to the corners of a triangle.
+#[inline(always)]
+fn gaps_to<I: Isa>(isa: I, point: Point, to: &Triangle) -> Vectors<I::C> {
+    subtract(corners(isa, to, 0), everywhere(isa, point))
+}
+
+#[inline(always)]
+fn gaps_from<I: Isa>(isa: I, [p, q, r]: &Triangle, to: &Triangle) -> [Vectors<I::C>; 3] {
+    [gaps_to(isa, *p, to), gaps_to(isa, *q, to), gaps_to(isa, *r, to)]
+}
+
+/// Returns what leads from each corner of a triangle to the next one.
+#[inline(always)]
+pub(super) fn edges<I: Isa>(isa: I, t: &Triangle) -> Vectors<I::C> {
+    subtract(corners(isa, t, 1), corners(isa, t, 0))
+}
+
+/// Returns the largest coordinate of each vector.
+#[inline(always)]
+pub(super) fn magnitude<C: Corners>([x, y, z]: Vectors<C>) -> C {
+    x.abs().max(y.abs()).max(z.abs())
+}
+
+/// Returns where a weight is strictly between 0 and 1.
+#[inline(always)]
+pub(super) fn is_between<C: Corners>(isa: impl Isa<C = C>, x: C) -> C::Mask {
+    C::and(isa.corners([0.0; 3]).lt(x), x.lt(isa.corners([1.0; 3])))
 }
 
 #[inline(always)]

@@ -21,15 +21,9 @@ use crate::isa::corners::Corners;
 #[must_use]
 #[inline(always)]
 pub(crate) fn point_distance<I: Isa>(isa: I, triangle: &Triangle, point: Point) -> Closest {
-    let of = |first: usize| {
-        let (p, q, r) = (triangle[first % 3], triangle[(first + 1) % 3], triangle[(first + 2) % 3]);
-        [isa.corners([p[0], q[0], r[0]]), isa.corners([p[1], q[1], r[1]]), isa.corners([p[2], q[2], r[2]])]
-    };
-    let corners = of(0);
-    let mut gaps = vectors::subtract(everywhere(isa, point), corners);
-    let mut edges = vectors::subtract(of(1), corners);
-    let of = |v: &Vectors<I::C>| v[0].abs().max(v[1].abs()).max(v[2].abs());
-    let size = of(&gaps).max(of(&edges)).largest();
+    let mut gaps = vectors::subtract(everywhere(isa, point), vectors::corners(isa, triangle, 0));
+    let mut edges = vectors::edges(isa, triangle);
+    let size = vectors::magnitude(gaps).max(vectors::magnitude(edges)).largest();
     if size == 0.0 {
         return Closest::meeting(triangle[0]);
     }
@@ -81,7 +75,7 @@ fn closest_foot<I: Isa>(isa: I, gaps: &Vectors<I::C>, edges: &Vectors<I::C>) -> 
     let inverse = I::C::select(is_short, none, one.div(squares));
     let along = vectors::dot(*gaps, *edges).mul(inverse);
     let perpendicular = vectors::less(*gaps, along, *edges);
-    let inside = I::C::and(none.lt(along), along.lt(one));
+    let inside = vectors::is_between(isa, along);
     let square = vectors::dot(perpendicular, perpendicular);
     let corners = vectors::dot(*gaps, *gaps).all();
     let sides = I::C::select(inside, square, isa.corners([f64::INFINITY; 3])).all();

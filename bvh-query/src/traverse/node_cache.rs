@@ -173,7 +173,7 @@ pub(crate) struct NodeCache {
     kept: usize,
     /// How often the cache has started anew.
     generation: u64,
-    /// The objects whose nodes these are. An object has one place, which follows from its file and page.
+    /// The objects whose nodes these are. An object is in one of a few places, which follow from its file and page.
     roots: [Root; ROOTS],
 }
 
@@ -203,8 +203,10 @@ impl Root {
 const MAX_TREELETS_PER_PAGE: usize = 124;
 /// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
 const MAX_NODES: usize = 1 << 29;
-/// The number of objects whose roots are found again.
+/// The most objects whose roots are found again.
 const ROOTS: usize = 32;
+/// The places in which an object may be, one after another. With one place, a pair of objects that share it would never find its nodes.
+const PLACES: usize = 4;
 
 /// With more nodes than this, the next walk starts anew; more are kept by and by. What a walk reads of a node with four children takes 600 bytes.
 const KEPT_AT_FIRST: usize = 256;
@@ -236,9 +238,11 @@ impl NodeCache {
     #[inline(always)]
     pub(crate) fn root<I: Isa>(&mut self, isa: I, bvh: &Bvh, object: &Object) -> Result<Root, QueryError> {
         let of = (bvh.identity(), object.record().first_page.get());
-        let known = &self.roots[place_of(of)];
-        if known.of == of && known.generation == self.generation {
-            return Ok(*known);
+        for place in places_of(of) {
+            let known = &self.roots[place];
+            if known.of == of && known.generation == self.generation {
+                return Ok(*known);
+            }
         }
         self.make_root(isa, bvh, object, of)
     }
@@ -264,7 +268,10 @@ impl NodeCache {
         above.lanes = [ChildLanes::new(1, 0), ChildLanes::NONE];
         self.used = node + 1;
         let root = Root { of, generation: self.generation, node, reach: Reach::of(&slabs) };
-        self.roots[place_of(of)] = root;
+        let mut places = places_of(of);
+        // If all are taken, the first one gives way.
+        let place = places.find(|&place| self.roots[place].generation != self.generation);
+        self.roots[place.unwrap_or(place_of(of))] = root;
         Ok(root)
     }
 
@@ -319,10 +326,17 @@ impl NodeCache {
     }
 }
 
-/// Returns the place of an object among the roots.
+/// Returns the first place in which an object may be among the roots.
 #[inline(always)]
 fn place_of((file, page): (u64, u32)) -> usize {
     (file.wrapping_mul(37) as usize).wrapping_add(page as usize) % ROOTS
+}
+
+/// Returns all places in which an object may be.
+#[inline(always)]
+fn places_of(of: (u64, u32)) -> impl Iterator<Item = usize> {
+    let first = place_of(of);
+    (0..PLACES).map(move |next| (first + next) % ROOTS)
 }
 
 /// Returns the number of treelets that an object can have.
@@ -561,5 +575,20 @@ mod tests {
         assert_eq!(Backend::Scalar.run(OpenRoot(&files[1], &mut nodes, 1)), Ok(2));
         assert_eq!((nodes.used, nodes.generation()), (3, 2));
         assert_eq!(Backend::Scalar.run(OpenRoot(&files[0], &mut nodes, 1)), Ok(4));
+    }
+
+    #[test]
+    fn objects_that_share_a_place_are_both_found_again() {
+        let bytes = include_bytes!("../../../testdata/ok-plain.cbvh");
+        let files: Vec<_> = (0..2 * ROOTS).map(|_| Bvh::from_static(bytes).unwrap()).collect();
+        let place = |bvh: &Bvh| place_of((bvh.identity(), bvh.objects()[0].record().first_page.get()));
+        let (shared, mut nodes) = (place(&files[0]), NodeCache::default());
+        let sharing: Vec<_> = files.iter().filter(|bvh| place(bvh) == shared).take(PLACES).collect();
+        assert!(sharing.len() > 1);
+        for left in [1, 0] {
+            for bvh in &sharing {
+                assert!(Backend::Scalar.run(OpenRoot(bvh, &mut nodes, left)).is_ok());
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The AVX2 backend: two registers of 8 lanes hold 16 lanes, and an SSE register holds 4.
 //!
 //! All `unsafe` here rests on one fact: only `detect` creates an `Avx2`, after it has found the features below on
-//! the CPU, and a `Y`, `X` or `D` can be made only with an `Avx2`.
+//! the CPU, and a `Y`, `X` or `D` can be made only with an `Avx2`, or a `D` with an `Avx512`.
 
 use super::corners::Corners;
 use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
@@ -131,8 +131,10 @@ impl Lanes for X {
 }
 
 impl D {
+    /// Makes a register of three numbers.
+    ///
     /// # Safety
-    /// The CPU has AVX2.
+    /// The CPU has AVX2: the caller has an `Avx2` or an `Avx512`.
     #[inline(always)]
     pub(crate) unsafe fn new([x, y, z]: [f64; 3]) -> Self {
         Self(with_features!(_mm256_setr_pd(x, y, z, z)))

@@ -97,7 +97,7 @@ impl Isa for Scalar {
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> Three {
-        Three::new(from)
+        Three::from(from)
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Array<16> {
