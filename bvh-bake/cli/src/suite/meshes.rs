@@ -25,6 +25,8 @@ impl Meshes {
 
     /// Bakes the mesh of a file into a `.cbvh` file beside it, maps that, and returns how long each took.
     pub(super) fn add_file(&mut self, message: &MeshFile) -> Result<Record, String> {
+        // Windows does not replace a file that is mapped.
+        self.0.remove(&message.mesh);
         let baked = bake_file(message);
         let answer = baked.as_ref().map(|(_, record)| record.clone()).map_err(Clone::clone);
         self.0.insert(message.mesh.clone(), baked.map(|(bvh, _)| bvh));

@@ -106,6 +106,7 @@ fn a_snapshot_stays_as_it_was() {
 
 /// Many threads ask while one swaps a shape, its pose and its margin back and forth: each answer is one of two.
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads here")]
 fn threads_that_ask_get_one_scene_or_the_other() {
     let shapes = [shape(&torus(24, 12)), shape(&plate(6))];
     let ball = shape(&sphere(3));
