@@ -149,6 +149,9 @@ pub(crate) struct PlacedPackets {
     keys: [u64; PACKETS_PER_SIDE],
     packets: Box<[PlacedPacket; PACKETS_PER_SIDE]>,
     query: u64,
+    /// For packets of A: the file and the unit of those that are kept, and whether they may be of another query.
+    of: (u64, u32),
+    is_open: bool,
 }
 
 impl Default for PlacedPackets {
@@ -157,6 +160,8 @@ impl Default for PlacedPackets {
             keys: [0; PACKETS_PER_SIDE],
             packets: Box::new([PlacedPacket::NONE; PACKETS_PER_SIDE]),
             query: 0,
+            of: (0, 0),
+            is_open: false,
         }
     }
 }
@@ -172,12 +177,76 @@ impl PlacedPackets {
         }
     }
 
-    /// Returns the place of a packet, and whether the packet is there. If it is not, the caller puts it there.
+    /// Starts a query in which the packets are A's. They do not depend on where B is, so that they stay if `settle` finds that
+    /// they are of the same file and in the same unit.
+    pub(crate) fn reopen(&mut self) {
+        self.is_open = true;
+    }
+
+    /// Forgets all packets if they are not of this file and in this unit. Only once a packet is needed, because most queries
+    /// need none.
     #[inline(always)]
-    pub(crate) fn place(&mut self, page: u32, packet: u16) -> (bool, &mut PlacedPacket) {
-        let key = self.query << 42 | u64::from(page) << 16 | u64::from(packet);
+    pub(crate) fn settle(&mut self, of: (u64, u32)) {
+        if std::mem::take(&mut self.is_open) && self.of != of {
+            self.of = of;
+            self.start();
+        }
+    }
+
+    /// Returns the place of a packet.
+    #[inline(always)]
+    pub(crate) fn place(&mut self, page: u32, packet: u16) -> Place<'_> {
+        let wanted = self.query << 42 | u64::from(page) << 16 | u64::from(packet);
         let place = (page as usize * 37 + usize::from(packet)) % PACKETS_PER_SIDE;
-        let known = std::mem::replace(&mut self.keys[place], key) == key;
-        (known, &mut self.packets[place])
+        Place { key: &mut self.keys[place], wanted, packet: &mut self.packets[place] }
+    }
+}
+
+/// The place of a packet, which may hold another one.
+pub(crate) struct Place<'a> {
+    key: &'a mut u64,
+    wanted: u64,
+    pub(crate) packet: &'a mut PlacedPacket,
+}
+
+impl Place<'_> {
+    /// Returns whether the packet is there. If it is not, the caller puts it there, and says so.
+    #[inline(always)]
+    pub(crate) fn is_known(&self) -> bool {
+        *self.key == self.wanted
+    }
+
+    /// Says that the packet is there from now on.
+    #[inline(always)]
+    pub(crate) fn keep(&mut self) {
+        *self.key = self.wanted;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packets_of_a_stay_while_they_are_of_the_same_file_and_unit() {
+        let mut packets = PlacedPackets::default();
+        packets.start();
+        // The caller may fail to put a packet there.
+        assert!(!packets.place(3, 5).is_known());
+        assert!(!packets.place(3, 5).is_known());
+        for (of, stays) in [((1, 2), false), ((1, 2), true), ((1, 3), false), ((2, 3), false), ((2, 3), true)]
+        {
+            packets.reopen();
+            packets.settle(of);
+            let mut place = packets.place(3, 5);
+            assert_eq!(place.is_known(), stays, "{of:?}");
+            place.keep();
+            // Only the first packet of a query asks whether the others may stay.
+            packets.settle((9, 9));
+            assert!(packets.place(3, 5).is_known());
+            assert!(!packets.place(3, 6).is_known());
+        }
+        packets.start();
+        assert!(!packets.place(3, 5).is_known());
     }
 }

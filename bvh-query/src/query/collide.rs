@@ -67,7 +67,7 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
-        self.packets.iter_mut().for_each(PlacedPackets::start);
+        self.start_packets();
         let mut visitor = ContactVisitor {
             packets: &mut self.packets,
             order: Order::Nearest,

@@ -2,7 +2,6 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::pose::Pose;
 use crate::query::answers::{Contact, QueryStats};
@@ -110,7 +109,7 @@ impl Querier {
         }
         self.queue.clear();
         self.bounded.clear();
-        self.packets.iter_mut().for_each(PlacedPackets::start);
+        self.start_packets();
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
         let budget = self.memory.budget;
         let mut contacts = 0;

@@ -4,7 +4,6 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::query::answers::{Distance, QueryStats};
@@ -148,7 +147,7 @@ impl Querier {
                 return Ok(None);
             }
             self.queue.clear();
-            self.packets.iter_mut().for_each(PlacedPackets::start);
+            self.start_packets();
             self.bounded.clear();
             let finalists = Finalists {
                 placed,

@@ -64,13 +64,16 @@ impl PlacedPair<'_> {
         packets: &'a mut PlacedPackets,
         leaf: LeafPacket,
     ) -> Result<&'a PlacedPacket, QueryError> {
-        let (known, placed) = packets.place(leaf.page, leaf.packet);
-        if !known {
+        packets.settle((self.pair.bvh_a.identity(), self.frame().scale.to_bits()));
+        let mut place = packets.place(leaf.page, leaf.packet);
+        if !place.is_known() {
             let _stage = Stage::Place.enter();
             let ObjectPair { bvh_a, object_a, .. } = self.pair;
-            placed.place_a(isa, self.frame(), bvh_a.packet(isa, object_a, leaf, &mut Packet::default())?);
+            let room = &mut Packet::default();
+            place.packet.place_a(isa, self.frame(), bvh_a.packet(isa, object_a, leaf, room)?);
+            place.keep();
         }
-        Ok(placed)
+        Ok(place.packet)
     }
 
     /// Fetches a leaf packet of B.
@@ -81,13 +84,15 @@ impl PlacedPair<'_> {
         packets: &'a mut PlacedPackets,
         leaf: LeafPacket,
     ) -> Result<&'a PlacedPacket, QueryError> {
-        let (known, placed) = packets.place(leaf.page, leaf.packet);
-        if !known {
+        let mut place = packets.place(leaf.page, leaf.packet);
+        if !place.is_known() {
             let _stage = Stage::Place.enter();
             let ObjectPair { bvh_b, object_b, .. } = self.pair;
-            placed.place_b(isa, self.frame(), bvh_b.packet(isa, object_b, leaf, &mut Packet::default())?);
+            let room = &mut Packet::default();
+            place.packet.place_b(isa, self.frame(), bvh_b.packet(isa, object_b, leaf, room)?);
+            place.keep();
         }
-        Ok(placed)
+        Ok(place.packet)
     }
 }
 

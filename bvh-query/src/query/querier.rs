@@ -56,6 +56,13 @@ pub(super) struct Ends {
 }
 
 impl Querier {
+    /// Forgets placed packets that are of no use in the next query.
+    pub(super) fn start_packets(&mut self) {
+        let [packets_a, packets_b] = &mut self.packets;
+        packets_a.reopen();
+        packets_b.start();
+    }
+
     /// Creates a querier with the fastest backend of this CPU, or with the one that the environment variable `CBVH_ISA`
     /// names.
     ///

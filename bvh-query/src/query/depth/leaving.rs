@@ -3,7 +3,6 @@
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::Isa;
-use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TrianglePair;
 use crate::narrow::{Point, Triangle, Way, leaves_before, stretch};
 use crate::query::answers::QueryStats;
@@ -72,7 +71,7 @@ impl Querier {
             return Ok(());
         }
         self.queue.clear();
-        self.packets.iter_mut().for_each(PlacedPackets::start);
+        self.start_packets();
         let way = Way { direction: line.direction, length: line.length, error: line.error };
         let visit = &mut |pair: TrianglePair| {
             let a = placed.triangle_a(pair.a, pair.lane_a)?;

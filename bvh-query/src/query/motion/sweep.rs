@@ -42,7 +42,7 @@ impl Querier {
         let pair = ObjectPair { placement: &start, end: &end, ..placed.pair };
         self.queue.clear();
         self.at_end.queue.clear();
-        self.packets.iter_mut().for_each(PlacedPackets::start);
+        self.start_packets();
         self.at_end.packets.start();
         let mut visitor = Swept {
             packets: &mut self.packets,
