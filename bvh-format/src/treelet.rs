@@ -189,6 +189,15 @@ impl Links {
         8 - self.kinds.leading_zeros() as usize / 4
     }
 
+    /// Returns the number of the leaf packet in place `index`, 0 to 7, and how many triangles it has. What is no packet gives
+    /// numbers without meaning.
+    #[inline]
+    pub fn packet(&self, index: usize) -> (u16, u8) {
+        let shift = 4 * (index as u32 & 7);
+        let before = (self.leaves() & ((1 << shift) - 1)).count_ones();
+        (self.first_leaf.wrapping_add(before as u16), (self.kinds >> shift & 3) as u8 + 1)
+    }
+
     /// Returns the child in place `index`, 0 to 7.
     #[inline]
     pub fn child(&self, index: usize) -> Child {
@@ -205,10 +214,10 @@ impl Links {
                 Child::Treelet(first.wrapping_add(rank(of) as u8))
             }
             KIND_REMOTE => Child::Remote(self.first_remote.wrapping_add(rank(self.remotes()) as u8)),
-            KIND_LEAF..=KIND_LEAF_LAST => Child::Leaf {
-                packet: self.first_leaf.wrapping_add(rank(self.leaves()) as u16),
-                triangles: (kind - KIND_LEAF) as u8 + 1,
-            },
+            KIND_LEAF..=KIND_LEAF_LAST => {
+                let (packet, triangles) = self.packet(index);
+                Child::Leaf { packet, triangles }
+            }
             _ => Child::Empty,
         }
     }

@@ -57,11 +57,9 @@ impl LargeLeaves {
         entry: Entry,
         limit: f32,
     ) -> Result<bool, QueryError> {
-        let (node_a, node_b) = (nodes.get(entry.a.node()), nodes.get(entry.b.node()));
-        let (child_a, child_b) = (entry.a.child(), entry.b.child());
-        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
-        let is_large = node_a.is_leaf(child_a) && extent_a > EXTENT_RATIO_TO_TEST_TRIANGLES * extent_b
-            || node_b.is_leaf(child_b) && extent_b > EXTENT_RATIO_TO_TEST_TRIANGLES * extent_a;
+        let (a, b) = (nodes.child(entry.a), nodes.child(entry.b));
+        let is_large = a.is_leaf() && a.extent > EXTENT_RATIO_TO_TEST_TRIANGLES * b.extent
+            || b.is_leaf() && b.extent > EXTENT_RATIO_TO_TEST_TRIANGLES * a.extent;
         if !is_large {
             return Ok(false);
         }
@@ -69,7 +67,7 @@ impl LargeLeaves {
             self.unbounded_visits -= 1;
             return Ok(false);
         }
-        let beyond = self.bound_triangles(pair, (node_a, node_b), reaches, entry, limit)?;
+        let beyond = self.bound_triangles(pair, nodes, reaches, entry, limit)?;
         self.unbounded_visits = if beyond { 0 } else { VISITS_AFTER_FAILED_BOUNDS };
         Ok(beyond)
     }
@@ -79,21 +77,23 @@ impl LargeLeaves {
     fn bound_triangles(
         &mut self,
         pair: &ObjectPair<'_>,
-        (node_a, node_b): (&CachedNode, &CachedNode),
+        nodes: &NodeCache,
         (reach_a, reach_b): (f32, f32),
         entry: Entry,
         limit: f32,
     ) -> Result<bool, QueryError> {
-        if let Some(leaf) = node_a.leaf(entry.a.child()) {
+        if let Some(leaf) = nodes.leaf(entry.a) {
             self.leaf_a.hold((pair.bvh_a, pair.object_a), (entry.a, leaf), None)?;
             let set = pair.object_b.profile().directions();
-            let small = SmallNode { node: node_b, child: entry.b.child(), set, reach: reach_b };
+            let small =
+                SmallNode { node: nodes.get(entry.b.node()), child: entry.b.child(), set, reach: reach_b };
             return Ok(self.leaf_a.is_beyond_b(pair.placement, &small, limit));
         }
-        let Some(leaf) = node_b.leaf(entry.b.child()) else { return Ok(false) };
+        let Some(leaf) = nodes.leaf(entry.b) else { return Ok(false) };
         self.leaf_b.hold((pair.bvh_b, pair.object_b), (entry.b, leaf), Some(pair.placement))?;
         let set = pair.object_a.profile().directions();
-        let small = SmallNode { node: node_a, child: entry.a.child(), set, reach: reach_a };
+        let small =
+            SmallNode { node: nodes.get(entry.a.node()), child: entry.a.child(), set, reach: reach_a };
         Ok(self.leaf_b.is_beyond_a(pair.placement, &small, limit))
     }
 }
@@ -123,7 +123,7 @@ struct SmallNode<'a> {
 impl SmallNode<'_> {
     /// Returns a slab end by its row: lower ends from 0 on, upper ends from 16 on.
     fn end(&self, row: usize) -> f64 {
-        f64::from(self.node.groups[(self.child / 4) & 1].rows()[row & 31][self.child % 4])
+        f64::from(self.node.group.rows()[row & 31][self.child & 3])
     }
 
     /// Returns the centre of its box.

@@ -5,16 +5,18 @@ use crate::traverse::pending::{Entry, Tested};
 /// Pairs of leaf packets in the order in which they were met.
 #[derive(Default)]
 pub(crate) struct LeafPairs {
-    /// Node tests, and the lanes of the pairs that they left. Those from `used` on have no meaning.
-    tests: Vec<(Tested, u16)>,
+    /// Node tests that left at least one pair. Those from `used` on have no meaning.
+    tests: Vec<Tested>,
     used: usize,
     /// The number of pairs.
     pairs: u32,
+    /// The test of the first pair.
+    first: usize,
 }
 
 impl LeafPairs {
     pub(crate) fn clear(&mut self) {
-        (self.used, self.pairs) = (0, 0);
+        (self.used, self.pairs, self.first) = (0, 0, 0);
     }
 
     /// Returns the number of pairs.
@@ -29,24 +31,28 @@ impl LeafPairs {
         if self.tests.len() <= self.used {
             self.grow();
         }
-        self.tests[self.used] = (*tested, mask);
+        self.tests[self.used] = Tested { left: mask, ..*tested };
         self.used += usize::from(mask != 0);
         self.pairs += mask.count_ones();
     }
 
     #[cold]
     fn grow(&mut self) {
-        self.tests.resize(2 * self.used + 16, (Tested::NONE, 0));
+        self.tests.resize(2 * self.used + 16, Tested::NONE);
     }
 
-    /// Returns the first pair from a place on, and the place after it. A place is a test and a lane of it.
+    /// Takes the first pair. No branch depends on where it is.
     #[inline(always)]
-    pub(crate) fn next(&self, (test, lane): (usize, u32)) -> Option<(Entry, (usize, u32))> {
-        let (tested, mask) = self.tests[..self.used].get(test)?;
-        // Each test has at least one pair, and a place is never after its last one.
-        let lane = lane + (u32::from(*mask) >> lane).trailing_zeros();
-        let after = lane + 1;
-        let is_last = u32::from(*mask) >> after == 0;
-        Some((tested.entry(lane), if is_last { (test + 1, 0) } else { (test, after) }))
+    pub(crate) fn take(&mut self) -> Option<Entry> {
+        if self.pairs == 0 {
+            self.clear();
+            return None;
+        }
+        let test = &mut self.tests[self.first];
+        let entry = test.entry(test.left.trailing_zeros());
+        test.left &= test.left.wrapping_sub(1);
+        self.first += usize::from(test.left == 0);
+        self.pairs -= 1;
+        Some(entry)
     }
 }

@@ -19,7 +19,7 @@ use bvh_format::treelet::{Child, Links, child_slabs};
 use bvh_format::turning::TurningCodes;
 use bvh_format::{FormatError, Rule};
 
-/// A child of an opened node: the number of the node and, in the lowest three bits, that of the child.
+/// A child of an opened node: the number of the node and, in the lowest two bits, that of the child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ChildRef(u32);
 
@@ -29,7 +29,7 @@ impl ChildRef {
 
     #[inline(always)]
     pub(crate) fn new(node: usize, child: usize) -> Self {
-        Self((node as u32) << 3 | child as u32)
+        Self((node as u32) << 2 | child as u32)
     }
 
     #[inline(always)]
@@ -45,31 +45,55 @@ impl ChildRef {
 
     #[inline(always)]
     pub(crate) fn node(self) -> usize {
-        (self.0 >> 3) as usize
+        (self.0 >> 2) as usize
     }
 
     #[inline(always)]
     pub(crate) fn child(self) -> usize {
-        (self.0 & 7) as usize
+        (self.0 & 3) as usize
     }
 }
 
-/// The children of a node, decoded.
+/// Up to four children of a node, decoded. The others of a node of more than four are under the next number.
 #[derive(Clone, Copy)]
 pub(crate) struct CachedNode {
-    pub(crate) groups: [Group; 2],
-    /// The turning slabs of the first group. Only profiles of four children have them.
+    pub(crate) group: Group,
     pub(crate) turning: TurningCodes,
-    /// The largest side of each child's box, in mesh units.
-    pub(crate) extents: [f32; 8],
-    /// The numbers of the children's opened nodes; `CLOSED` for children that have not been opened.
-    opened: [u32; 8],
-    /// Where the children are.
+    /// Where all children of the node are.
     links: Links,
     page: u32,
-    pub(crate) count: usize,
-    /// The lanes of the children in tests of 16 pairs, by group.
-    pub(crate) lanes: [ChildLanes; 2],
+    /// The place of the first of these children among those of the node: 0 or 4.
+    first: u8,
+    /// Whether the next number has more children of the same node.
+    pub(crate) continues: bool,
+    /// The lanes of the children in tests of 16 pairs.
+    pub(crate) lanes: ChildLanes,
+}
+
+/// What a walk asks first of a child.
+#[derive(Clone, Copy)]
+pub(crate) struct ChildInfo {
+    /// The largest side of its box, in mesh units.
+    pub(crate) extent: f32,
+    /// The number of its opened node, or `CLOSED`; of a leaf packet, `LEAF` with the number of the packet in the lowest bits,
+    /// and how many triangles it has above.
+    opened: u32,
+}
+
+/// Stands for the number of a node that has not been opened.
+const CLOSED: u32 = LEAF - 1;
+/// The lowest of what stands for leaf packets.
+const LEAF: u32 = 1 << 31;
+/// How many bits the number of a packet takes.
+const PACKET_BITS: u32 = 16;
+
+impl ChildInfo {
+    const NONE: Self = Self { extent: 0.0, opened: CLOSED };
+
+    #[inline(always)]
+    pub(crate) fn is_leaf(self) -> bool {
+        self.opened >= LEAF
+    }
 }
 
 /// The lanes in which four children take part in a test of 16 pairs: as children of A, and as children of B.
@@ -104,44 +128,42 @@ static ROWS_OF_LANES: [u16; 16] = {
     lanes
 };
 
-/// Stands for the number of a node that has not been opened.
-const CLOSED: u32 = u32::MAX;
-
 impl CachedNode {
     const EMPTY: Self = Self {
-        groups: [Group::ZERO; 2],
+        group: Group::ZERO,
         turning: TurningCodes::NONE,
-        extents: [0.0; 8],
-        opened: [CLOSED; 8],
         links: Links::NONE,
         page: 0,
-        count: 0,
-        lanes: [ChildLanes::NONE; 2],
+        first: 0,
+        continues: false,
+        lanes: ChildLanes::NONE,
     };
 
-    /// Returns the child, if it is a leaf packet.
+    /// Adopts the children of a treelet from `first` on, whose slabs have been decoded.
     #[inline(always)]
-    pub(crate) fn leaf(&self, child: usize) -> Option<LeafPacket> {
-        leaf_at(&self.links, self.page, child)
-    }
-
-    #[inline(always)]
-    pub(crate) fn is_leaf(&self, child: usize) -> bool {
-        self.links.kinds >> (4 * child + 2) & 1 == 1
-    }
-
-    /// Computes the extents, after the slabs have been decoded.
-    #[inline(always)]
-    fn measure<I: Isa>(&mut self, isa: I, parts: usize) {
-        for part in 0..parts {
-            let rows = self.groups[part & 1].rows();
-            let mut widest = isa.load4(&rows[16]).sub(isa.load4(&rows[0]));
-            for axis in 1..3 {
-                widest = widest.max(isa.load4(&rows[16 + axis]).sub(isa.load4(&rows[axis])));
-            }
-            if let Some(extents) = self.extents.as_chunks_mut::<4>().0.get_mut(part) {
-                isa.store4(widest, extents);
-            }
+    fn adopt<I: Isa>(
+        &mut self,
+        isa: I,
+        (opened, count): (&Opened<'_>, usize),
+        first: usize,
+        infos: &mut [ChildInfo],
+    ) {
+        (self.links, self.page) = (opened.links, opened.page.header().page_number.get());
+        (self.first, self.continues) = (first as u8, first + 4 < count);
+        let children = (1u16 << count.saturating_sub(first).min(4)) - 1;
+        let leaves = leaf_lanes(&self.links, first / 4);
+        self.lanes = ChildLanes::new(children, leaves);
+        let (rows, mut extents) = (self.group.rows(), [0.0; 4]);
+        let mut widest = isa.load4(&rows[16]).sub(isa.load4(&rows[0]));
+        for axis in 1..3 {
+            widest = widest.max(isa.load4(&rows[16 + axis]).sub(isa.load4(&rows[axis])));
+        }
+        isa.store4(widest, &mut extents);
+        for (child, info) in infos.iter_mut().enumerate() {
+            let (packet, triangles) = self.links.packet(first + child);
+            let leaf = LEAF | u32::from(triangles) << PACKET_BITS | u32::from(packet);
+            let opened = if leaves >> child & 1 == 1 { leaf } else { CLOSED };
+            *info = ChildInfo { extent: extents[child & 3], opened };
         }
     }
 }
@@ -168,6 +190,8 @@ pub(super) fn leaf_lanes(links: &Links, part: usize) -> u16 {
 #[derive(Default)]
 pub(crate) struct NodeCache {
     nodes: Vec<CachedNode>,
+    /// By `ChildRef`: four for each node.
+    children: Vec<ChildInfo>,
     used: usize,
     /// With more nodes than this, the next walk starts anew.
     kept: usize,
@@ -201,7 +225,7 @@ impl Root {
 /// More treelets than a page has by rule 17: its header and one anchor take two of its 64 lines, and a short treelet
 /// takes half a line.
 const MAX_TREELETS_PER_PAGE: usize = 124;
-/// The most nodes in the cache: a `ChildRef` has 29 bits for the number of a node. So many nodes take 600 GB.
+/// The most numbers of nodes in the cache, fewer than a `ChildRef` has bits for. So many take 320 GB.
 const MAX_NODES: usize = 1 << 29;
 /// The most objects whose roots are found again.
 const ROOTS: usize = 32;
@@ -258,14 +282,14 @@ impl NodeCache {
         let slabs = bvh.page(object, of.1)?.anchor_slabs(0);
         let node = self.room(bvh, object)?;
         let above = &mut self.nodes[node];
-        above.groups[0] = isa.run(Spread(&slabs));
-        above.turning = TurningCodes::NONE;
-        above.links = Links { kinds: 1, ..Links::NONE };
-        above.page = of.1;
-        above.extents[0] = f32::INFINITY;
-        above.opened = [CLOSED; 8];
-        above.count = 1;
-        above.lanes = [ChildLanes::new(1, 0), ChildLanes::NONE];
+        *above = CachedNode {
+            group: isa.run(Spread(&slabs)),
+            links: Links { kinds: 1, ..Links::NONE },
+            page: of.1,
+            lanes: ChildLanes::new(1, 0),
+            ..CachedNode::EMPTY
+        };
+        self.children[4 * node] = ChildInfo { extent: f32::INFINITY, opened: CLOSED };
         self.used = node + 1;
         let root = Root { of, generation: self.generation, node, reach: Reach::of(&slabs) };
         let mut places = places_of(of);
@@ -275,15 +299,16 @@ impl NodeCache {
         Ok(root)
     }
 
-    /// Returns the number of the next node, for which there is room.
+    /// Returns the number of the next node, for which there is room, and for the next number.
     #[inline(always)]
     fn room(&mut self, bvh: &Bvh, object: &Object) -> Result<usize, QueryError> {
-        if self.used >= self.nodes.len() {
-            if self.used >= MAX_NODES {
+        if self.used + 1 >= self.nodes.len() {
+            if self.used + 1 >= MAX_NODES {
                 return Err(too_many(bvh, object, MAX_NODES));
             }
             // Not many at once, because filling them takes time in the middle of a query.
             self.nodes.resize(self.used + 64, CachedNode::EMPTY);
+            self.children.resize(4 * self.nodes.len(), ChildInfo::NONE);
         }
         Ok(self.used)
     }
@@ -298,6 +323,28 @@ impl NodeCache {
         &self.nodes[node]
     }
 
+    /// Returns what a walk asks first of a child.
+    #[inline(always)]
+    pub(crate) fn child(&self, at: ChildRef) -> ChildInfo {
+        self.children[at.bits() as usize]
+    }
+
+    /// Returns the first number of a child's node, and the child's place among all children of the node.
+    #[cfg(feature = "trace")]
+    pub(crate) fn place_in_treelet(&self, at: ChildRef) -> (usize, usize) {
+        let first = usize::from(self.nodes[at.node()].first);
+        (at.node() - first / 4, first + at.child())
+    }
+
+    /// Returns a child, if it is a leaf packet.
+    #[inline(always)]
+    pub(crate) fn leaf(&self, at: ChildRef) -> Option<LeafPacket> {
+        let opened = self.child(at).opened;
+        let (packet, triangles) = (opened as u16, (opened >> PACKET_BITS) as u8);
+        let page = self.nodes[at.node()].page;
+        (opened >= LEAF).then_some(LeafPacket { page, packet, triangles })
+    }
+
     /// Returns the number of the opened node of an inner child. For a leaf that is a node without children. `left` is the
     /// number of nodes that the walk may still add for the object: by the rules of the format, it never needs more than the
     /// object can have, and with this limit every walk ends, even if the bytes change after they were checked.
@@ -310,18 +357,18 @@ impl NodeCache {
         at: ChildRef,
         left: &mut usize,
     ) -> Result<usize, QueryError> {
-        let known = self.nodes[at.node()].opened[at.child()];
-        if known != CLOSED {
+        let known = self.child(at).opened;
+        if known < CLOSED {
             return Ok(known as usize);
         }
         let _stage = Stage::Decode.enter();
         *left = left.checked_sub(1).ok_or_else(|| too_many(bvh, object, max_nodes(object)))?;
         let number = self.room(bvh, object)?;
         let (before, behind) = self.nodes.split_at_mut(number);
-        let parent = &mut before[at.node()];
-        isa.run(DecodeNode { bvh, object, parent, child: at.child(), to: &mut behind[0] })?;
-        parent.opened[at.child()] = number as u32;
-        self.used += 1;
+        let (parent, infos) = (&before[at.node()], &mut self.children[4 * number..]);
+        let parts = isa.run(DecodeNode { bvh, object, parent, child: at.child(), to: behind, infos })?;
+        self.children[at.bits() as usize].opened = number as u32;
+        self.used += parts;
         Ok(number)
     }
 }
@@ -365,59 +412,49 @@ impl Task for Spread<'_> {
     }
 }
 
-/// Decodes an inner child of an opened node.
+/// Decodes an inner child of an opened node. Returns how many numbers it takes.
 struct DecodeNode<'a> {
     bvh: &'a Bvh,
     object: &'a Object,
     parent: &'a CachedNode,
     child: usize,
-    to: &'a mut CachedNode,
+    to: &'a mut [CachedNode],
+    infos: &'a mut [ChildInfo],
 }
 
 impl Task for DecodeNode<'_> {
-    type Output = Result<(), QueryError>;
+    type Output = Result<usize, QueryError>;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        decode_node(isa, self.bvh, self.object, self.parent, self.child, self.to)
-    }
-}
-
-#[inline(always)]
-fn decode_node<I: Isa>(
-    isa: I,
-    bvh: &Bvh,
-    object: &Object,
-    parent: &CachedNode,
-    child: usize,
-    to: &mut CachedNode,
-) -> Result<(), QueryError> {
-    let from = (&parent.groups, &parent.links, parent.page);
-    let Some(opened) = open_child(isa, (bvh, object), from, child, &mut to.groups)? else {
-        to.count = 0;
-        return Ok(());
-    };
-    let profile = object.profile();
-    to.turning = match opened.treelet.first_chunk() {
-        Some(treelet) if profile.has_turning_slabs() => TurningCodes::read(treelet),
-        _ => TurningCodes::NONE,
-    };
-    to.links = opened.links;
-    isa.prefetch::<10>(bvh.packets_to_prefetch(object, &opened.page, &to.links));
-    if bvh.is_worth_prefetching() {
-        for treelets in opened.page.treelets_ahead(&to.links) {
-            isa.prefetch::<8>(treelets);
+        let Self { bvh, object, parent, child, to: [to, next, ..], infos } = self else { return Ok(1) };
+        let from = (&parent.group, child, &parent.links, parent.page);
+        let place = usize::from(parent.first) + child;
+        let Some(opened) = open_child(isa, (bvh, object), from, place, [&mut to.group, &mut next.group])?
+        else {
+            (to.continues, to.lanes) = (false, ChildLanes::NONE);
+            return Ok(1);
+        };
+        let profile = object.profile();
+        to.turning = match opened.treelet.first_chunk() {
+            Some(treelet) if profile.has_turning_slabs() => TurningCodes::read(treelet),
+            _ => TurningCodes::NONE,
+        };
+        isa.prefetch::<10>(bvh.packets_to_prefetch(object, &opened.page, &opened.links));
+        if bvh.is_worth_prefetching() {
+            for treelets in opened.page.treelets_ahead(&opened.links) {
+                isa.prefetch::<8>(treelets);
+            }
         }
+        let count = opened.links.children().min(profile.width());
+        let (first, second) = infos.split_at_mut(4);
+        to.adopt(isa, (&opened, count), 0, first);
+        if count > 4 {
+            next.turning = TurningCodes::NONE;
+            next.adopt(isa, (&opened, count), 4, &mut second[..4]);
+        }
+        Ok(1 + usize::from(to.continues))
     }
-    to.page = opened.page.header().page_number.get();
-    to.count = to.links.children().min(profile.width());
-    for part in 0..profile.groups() {
-        let children = (1u16 << to.count.saturating_sub(4 * part).min(4)) - 1;
-        to.lanes[part & 1] = ChildLanes::new(children, leaf_lanes(&to.links, part));
-    }
-    to.opened = [CLOSED; 8];
-    to.measure(isa, profile.groups());
-    Ok(())
 }
 
 /// What an opened node has besides slabs.
@@ -427,23 +464,23 @@ pub(super) struct Opened<'a> {
     pub(super) treelet: &'a [u8],
 }
 
-/// Decodes the slabs of the children of an inner child, given the slabs of its siblings, their links and their page. A leaf
-/// or an empty place has nothing to open.
+/// Decodes the slabs of the children of an inner child, given the slabs of four siblings and its column of them, the links of
+/// all siblings, their page, and its place among them. A leaf or an empty place has nothing to open.
 #[inline(always)]
 pub(super) fn open_child<'a, I: Isa>(
     isa: I,
     (bvh, object): (&'a Bvh, &Object),
-    (groups, links, page): (&[Group; 2], &Links, u32),
+    (group, column, links, page): (&Group, usize, &Links, u32),
     child: usize,
-    to: &mut [Group; 2],
+    to: [&mut Group; 2],
 ) -> Result<Option<Opened<'a>>, QueryError> {
     let (at, slot, anchor);
-    let decoded = (&groups[(child / 4) & 1], child % 4);
+    let decoded = (group, column);
     let parent = match links.child(child) {
         Child::Treelet(place) => {
             at = bvh.page(object, page)?;
             slot = place;
-            Parent::Node(decoded.0, decoded.1)
+            Parent::Node(group, column)
         }
         Child::Remote(link) => {
             (at, slot) = cross(bvh, object, page, link)?;
@@ -458,9 +495,9 @@ pub(super) fn open_child<'a, I: Isa>(
     let profile = object.profile();
     let treelet = at.treelet(slot);
     let links = Links::read(profile, treelet);
-    for part in 0..profile.groups() {
+    for (part, to) in to.into_iter().enumerate().take(profile.groups()) {
         let coding = (profile, object.f16_scale());
-        decode_group(isa, coding, (treelet, part), parent, &mut to[part]);
+        decode_group(isa, coding, (treelet, part), parent, to);
     }
     Ok(Some(Opened { links, page: at, treelet }))
 }

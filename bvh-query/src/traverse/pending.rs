@@ -1,8 +1,8 @@
 //! The pairs that a walk has still to visit, grouped by the node test that left them.
 //!
 //! A test writes its 16 bounds directly into the list, and a mask marks the pairs that are left. Pairs are therefore
-//! neither moved nor sorted, and no branch depends on their number. In a depth-first walk, the last test is next. In a
-//! best-first walk, the test with the least bound is next.
+//! neither moved nor sorted. In a depth-first walk, the last test is next. In a best-first walk, the test with the least
+//! bound is next.
 
 use crate::isa::{Isa, in_order};
 use crate::traverse::node_cache::ChildRef;
@@ -31,10 +31,12 @@ pub(crate) struct Tested {
     /// The first of four children of each side.
     pub(crate) a: ChildRef,
     pub(crate) b: ChildRef,
+    /// The lanes of the pairs that are left.
+    pub(crate) left: u16,
 }
 
 impl Tested {
-    pub(crate) const NONE: Self = Self { bounds: [0.0; 16], a: ChildRef::NONE, b: ChildRef::NONE };
+    pub(crate) const NONE: Self = Self { bounds: [0.0; 16], a: ChildRef::NONE, b: ChildRef::NONE, left: 0 };
 
     /// Returns the pair in a lane.
     #[inline(always)]
@@ -45,19 +47,11 @@ impl Tested {
     }
 }
 
-/// A test and the pairs of it that are left. There is at least one.
-#[derive(Clone, Copy)]
-struct PendingTest {
-    tested: Tested,
-    /// The lanes of the pairs that are left.
-    left: u16,
-}
-
 /// The tests that still have pairs to visit.
 #[derive(Default)]
 pub(crate) struct PendingTests {
-    /// At least one longer than `len`, once room has been asked for.
-    tests: Vec<PendingTest>,
+    /// Each has at least one pair left. At least one longer than `len`, once room has been asked for.
+    tests: Vec<Tested>,
     /// The place of each test in the order of visits: `nearest` of its pairs. As long as `tests`.
     keys: Vec<i32>,
     len: usize,
@@ -79,24 +73,24 @@ impl PendingTests {
         if self.tests.len() <= self.len {
             self.grow();
         }
-        &mut self.tests[self.len].tested
+        &mut self.tests[self.len]
     }
 
     #[cold]
     fn grow(&mut self) {
         let length = 2 * self.len + 64;
-        self.tests.resize(length, PendingTest { tested: Tested::NONE, left: 0 });
+        self.tests.resize(length, Tested::NONE);
         self.keys.resize(length, 0);
     }
 
-    /// Keeps the test in `room`, unless no pairs are left. The pair in the lane of `key` comes first.
+    /// Keeps the test in `room`, of which pairs are left. That in the lane of `key` comes first.
     #[inline(always)]
     pub(crate) fn push(&mut self, left: u16, key: i32) {
         if let Some(test) = self.tests.get_mut(self.len)
             && let Some(to) = self.keys.get_mut(self.len)
         {
             (test.left, *to) = (left, key);
-            self.len += usize::from(left != 0);
+            self.len += 1;
         }
     }
 
@@ -122,9 +116,9 @@ impl PendingTests {
     #[inline(always)]
     fn take<I: Isa>(&mut self, isa: I, at: usize) -> (Entry, bool) {
         let (test, key) = (&mut self.tests[at], &mut self.keys[at]);
-        let entry = test.tested.entry(*key as u32 & 15);
+        let entry = test.entry(*key as u32 & 15);
         test.left &= !(1 << (*key & 15));
-        *key = isa.nearest(&test.tested.bounds, test.left);
+        *key = isa.nearest(&test.bounds, test.left);
         (entry, test.left == 0)
     }
 
@@ -245,7 +239,9 @@ mod tests {
                     let room = pending.room();
                     (room.bounds, room.a, room.b) =
                         (bounds, ChildRef::new(number, 0), ChildRef::new(number, 0));
-                    pending.push(left, isa.nearest(&bounds, left));
+                    if left != 0 {
+                        pending.push(left, isa.nearest(&bounds, left));
+                    }
                     for lane in (0..16).filter(|lane| left >> lane & 1 == 1) {
                         let child = |at: usize| ChildRef::new(number, at).bits();
                         expected.push((bounds[lane], child(lane / 4), child(lane % 4)));
@@ -275,7 +271,7 @@ mod tests {
         let of = |at: u32| ChildRef::from_bits(at);
         pending.tests[..pending.len].iter().any(|test| {
             let lane = 4 * of(*a).child() + of(*b).child();
-            test.tested.a.node() == of(*a).node() && test.left >> lane & 1 == 1
+            test.a.node() == of(*a).node() && test.left >> lane & 1 == 1
         })
     }
 

@@ -47,9 +47,9 @@ pub(super) struct PerWalk<T> {
     /// How many values this walk has computed.
     used: usize,
     /// The number of the walk, not 0.
-    walk: u64,
+    walk: u32,
     /// By node: the walk that computed its value last, and where it put it.
-    places: Vec<(u64, usize)>,
+    places: Vec<(u32, u32)>,
 }
 
 impl<T> Default for PerWalk<T> {
@@ -59,9 +59,20 @@ impl<T> Default for PerWalk<T> {
 }
 
 impl<T: Zeroable + Clone> PerWalk<T> {
-    /// Forgets all values, for a walk of a number of its own.
-    pub(super) fn start(&mut self, walk: u64) {
-        (self.walk, self.used) = (walk, 0);
+    /// Forgets all values, before a walk.
+    #[inline(always)]
+    pub(super) fn start(&mut self) {
+        (self.walk, self.used) = (self.walk.wrapping_add(1), 0);
+        if self.walk == 0 {
+            self.start_over();
+        }
+    }
+
+    /// Forgets the walks of all nodes, when their numbers have been used up.
+    #[cold]
+    fn start_over(&mut self) {
+        self.walk = 1;
+        self.places.fill((0, 0));
     }
 
     /// Returns the value of a node, and whether this walk has computed it. If it has not, the caller computes it.
@@ -73,16 +84,10 @@ impl<T: Zeroable + Clone> PerWalk<T> {
         let (walk, place) = &mut self.places[node];
         let known = *walk == self.walk;
         if !known {
-            (*walk, *place) = (self.walk, self.used);
+            (*walk, *place) = (self.walk, self.used as u32);
             self.used += 1;
         }
-        (&mut self.values[*place], known)
-    }
-
-    /// Returns the value of a node as it is. It has one: a call of `of` has computed it.
-    #[inline(always)]
-    pub(super) fn get(&self, node: usize) -> &T {
-        &self.values[self.places[node].1]
+        (&mut self.values[*place as usize], known)
     }
 
     #[cold]
@@ -90,5 +95,24 @@ impl<T: Zeroable + Clone> PerWalk<T> {
         let places = self.places.len().max(node + 64);
         self.places.resize(places, (0, 0));
         self.values.resize(self.used + 64, T::zeroed());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_those_of_this_walk_even_when_numbers_of_walks_start_over() {
+        let mut values = PerWalk::<u32> { walk: u32::MAX - 2, ..Default::default() };
+        for walk in 0..6 {
+            values.start();
+            let met = [70, 3, 70].map(|node| {
+                let (value, is_known) = values.of(node);
+                (std::mem::replace(value, walk), is_known)
+            });
+            assert_eq!(met.map(|(_, is_known)| is_known), [false, false, true], "{walk}");
+            assert_eq!(met[2].0, walk);
+        }
     }
 }

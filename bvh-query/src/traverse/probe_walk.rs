@@ -72,8 +72,9 @@ impl OpenedNode {
         parent: &Self,
         child: usize,
     ) -> Result<bool, QueryError> {
-        let from = (&parent.groups, &parent.links, parent.page);
-        let Some(Opened { links, page, .. }) = open_child(isa, (bvh, object), from, child, &mut self.groups)?
+        let from = (&parent.groups[(child / 4) & 1], child % 4, &parent.links, parent.page);
+        let Some(Opened { links, page, .. }) =
+            open_child(isa, (bvh, object), from, child, self.groups.each_mut())?
         else {
             return Ok(false);
         };

@@ -54,13 +54,6 @@ pub(crate) struct TurningGroup {
     direction: Rows,
 }
 
-/// What the other side sees of four children.
-#[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Seen {
-    direction: Rows,
-    centre: Rows,
-}
-
 impl TurningGroup {
     /// Decodes the turning slabs of four children, given their fixed slabs.
     #[inline(always)]
@@ -156,39 +149,27 @@ impl SlabFilter {
         self.least_square = if a + b + t < MAX_MAGNITUDES { LEAST_SQUARE } else { f32::INFINITY };
     }
 
-    /// What B sees of four nodes of A.
-    #[inline(always)]
-    pub(crate) fn see_a<I: Isa>(&self, isa: I, group: &TurningGroup, seen: &mut Seen) {
-        let zero = isa.splat(0.0);
-        isa.store(turn(isa, &self.to_b, &group.direction, zero), &mut seen.direction.0);
-    }
-
-    /// What A sees of four nodes of B.
-    #[inline(always)]
-    pub(crate) fn see_b<I: Isa>(&self, isa: I, group: &TurningGroup, seen: &mut Seen) {
-        let zero = isa.splat(0.0);
-        isa.store(turn(isa, &self.to_a, &group.direction, zero), &mut seen.direction.0);
-        let centre = turn(isa, &self.columns, &group.centre, isa.load(&self.translation.0));
-        isa.store(centre, &mut seen.centre.0);
-    }
-
     /// Tests four nodes of A against four of B: raises the bounds that the node test has found.
     #[inline(always)]
     pub(crate) fn run<I: Isa>(
         &self,
         isa: I,
         measure: Measure,
-        (a, seen_a): (&TurningGroup, &Seen),
-        (b, seen_b): (&TurningGroup, &Seen),
+        (a, b): (&TurningGroup, &TurningGroup),
         limit: f32,
         bounds: &mut [f32; 16],
     ) -> u16 {
+        // In the frame of the other side. That takes less time than to find what was computed before.
+        let (zero, translation) = (isa.splat(0.0), isa.load(&self.translation.0));
+        let u_a_in_b = turn(isa, &self.to_b, &a.direction, zero);
+        let u_b_in_a = turn(isa, &self.to_a, &b.direction, zero);
+        let c_b = turn(isa, &self.columns, &b.centre, translation);
+        let (u_a_in_b, u_b_in_a, c_b) = (repeat(isa, &u_a_in_b), tile(isa, &u_b_in_a), tile(isa, &c_b));
         let (u_a, u_b) = (repeat(isa, &a.direction), tile(isa, &b.direction));
         let (half_a, half_b) = (repeat(isa, &a.half), tile(isa, &b.half));
         let (middle_a, middle_b) = (isa.repeat(a.centre.row(3)), isa.tile(b.centre.row(3)));
         let (width_a, width_b) = (isa.repeat(a.half.row(3)), isa.tile(b.half.row(3)));
-        let (u_a_in_b, u_b_in_a) = (repeat(isa, &seen_a.direction), tile(isa, &seen_b.direction));
-        let (c_a, c_b) = (repeat(isa, &a.centre), tile(isa, &seen_b.centre));
+        let c_a = repeat(isa, &a.centre);
         let to_b = [c_b[0].sub(c_a[0]), c_b[1].sub(c_a[1]), c_b[2].sub(c_a[2])];
         let (slack, outward) = (isa.splat(self.slack), isa.splat(1.0 + 1.0 / (1 << 20) as f32));
         // Along A's direction, then along B's.
@@ -265,12 +246,14 @@ fn rest<I: Isa>(x: [I::V; 3], alpha: I::V, u: [I::V; 3], half: [I::V; 3], radius
 
 /// Multiplies the vectors of four nodes by a matrix of three columns and adds a vector.
 #[inline(always)]
-fn turn<I: Isa>(isa: I, columns: &[Rows; 3], from: &Rows, add: I::V) -> I::V {
+fn turn<I: Isa>(isa: I, columns: &[Rows; 3], from: &Rows, add: I::V) -> Rows {
     let mut sum = add;
     for j in 0..3 {
         sum = isa.tile(from.row(j)).mul_add(isa.load(&columns[j].0), sum);
     }
-    sum
+    let mut turned = Rows::ZERO;
+    isa.store(sum, &mut turned.0);
+    turned
 }
 
 #[cfg(test)]

@@ -7,9 +7,9 @@ use crate::isa::{Isa, Task};
 use crate::traverse::node_cache::NodeCache;
 use crate::traverse::node_filter::{Measure, NodeFilter};
 use crate::traverse::pending::Tested;
-use crate::traverse::per_node::{PerNode, PerWalk};
+use crate::traverse::per_node::PerNode;
 use crate::traverse::placement::ObjectPair;
-use crate::traverse::slab_filter::{Seen, SlabFilter, TurningGroup};
+use crate::traverse::slab_filter::{SlabFilter, TurningGroup};
 
 /// Builds with debug assertions, which tests are, make all slab tests, so that small meshes take part.
 const ALWAYS: bool = cfg!(debug_assertions);
@@ -29,8 +29,6 @@ const FIRST_PAUSE: u32 = 24;
 pub(crate) struct SlabMemory {
     /// The turning slabs of opened nodes.
     groups: PerNode<TurningGroup>,
-    /// What the other side sees of them in this walk.
-    seen: [PerWalk<Seen>; 2],
     test: Option<Box<SlabFilter>>,
     /// The walk for which `test` was prepared.
     prepared: u64,
@@ -50,7 +48,6 @@ impl SlabMemory {
     /// Starts a walk, which has a number of its own.
     pub(crate) fn start(&mut self, walk: u64, pair: &ObjectPair<'_>) {
         self.walk = walk;
-        self.seen.iter_mut().for_each(|seen| seen.start(walk));
         self.applies =
             pair.object_a.profile().has_turning_slabs() && pair.object_b.profile().has_turning_slabs();
         (self.pause, self.balance, self.next_pause) = (NODE_TESTS_BEFORE_SLABS, 0, FIRST_PAUSE);
@@ -99,24 +96,15 @@ impl Task for TestSlabs<'_> {
             memory.prepared = memory.walk;
             prepare(test, node_filter);
         }
-        let (groups, [seen_a, seen_b]) = (&mut memory.groups, &mut memory.seen);
+        let groups = &mut memory.groups;
         for (number, node) in [(number_a, node_a), (number_b, node_b)] {
             let (group, is_known) = groups.of(number, nodes.generation());
             if !is_known {
-                group.decode(isa, &node.turning, &node.groups[0]);
+                group.decode(isa, &node.turning, &node.group);
             }
         }
         let (group_a, group_b) = (groups.get(number_a), groups.get(number_b));
-        let (seen_a, is_known) = seen_a.of(number_a);
-        if !is_known {
-            test.see_a(isa, group_a, seen_a);
-        }
-        let (seen_b, is_known) = seen_b.of(number_b);
-        if !is_known {
-            test.see_b(isa, group_b, seen_b);
-        }
-        let (a, b) = ((group_a, &*seen_a), (group_b, &*seen_b));
-        let left = mask & test.run(isa, measure, a, b, limit, &mut tested.bounds);
+        let left = mask & test.run(isa, measure, (group_a, group_b), limit, &mut tested.bounds);
         let apart = (mask & !left).count_ones() as i32;
         memory.balance += TESTS_SAVED_PER_PAIR * apart - 1;
         if memory.balance > MAX_BALANCE {

@@ -5,7 +5,6 @@
 //! children of a node are.
 
 use crate::file::place::LeafPacket;
-use crate::traverse::node_cache::ChildRef;
 use crate::traverse::placement::ObjectPair;
 use std::cell::RefCell;
 
@@ -61,8 +60,8 @@ pub(super) fn objects(pair: &ObjectPair<'_>, above: [usize; 2]) {
     add(Step::Objects { pages, above: above.map(|node| node as u32) });
 }
 
-pub(super) fn opened(side: u8, at: ChildRef, node: usize) {
-    add(Step::Opened { side, parent: at.node() as u32, child: at.child() as u8, node: node as u32 });
+pub(super) fn opened(side: u8, (parent, child): (usize, usize), node: usize) {
+    add(Step::Opened { side, parent: parent as u32, child: child as u8, node: node as u32 });
 }
 
 pub(super) fn packets((a, b): (LeafPacket, LeafPacket)) {

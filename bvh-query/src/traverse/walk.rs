@@ -29,7 +29,7 @@ use crate::isa::{Isa, Task};
 use crate::traverse::budget::Budget;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
-use crate::traverse::node_cache::{CachedNode, ChildRef, NodeCache, Root, max_nodes};
+use crate::traverse::node_cache::{ChildRef, NodeCache, Root, max_nodes};
 use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
 use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
@@ -39,7 +39,7 @@ use crate::traverse::stages::Stage;
 #[cfg(feature = "trace")]
 use crate::traverse::trace;
 use bvh_format::slabs::Group;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 /// The order in which pairs are visited.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -135,9 +135,9 @@ pub(crate) struct PairMemory {
     /// How many nodes the walk may still add for A and for B.
     left: (usize, usize),
     /// The groups of A's opened nodes along B's directions, computed when they are first needed.
-    aligned_a: PerWalk<[Group; 2]>,
+    aligned_a: PerWalk<Group>,
     /// The groups of B's opened nodes along A's directions.
-    aligned_b: PerWalk<[Group; 2]>,
+    aligned_b: PerWalk<Group>,
     /// The test along turning slabs.
     slabs: SlabMemory,
     /// Depth-first: the pairs that node tests left.
@@ -195,9 +195,10 @@ struct PairWalk<'a, 'p, W> {
 /// An opened node whose children meet those of the other side. If a node was not opened, its parent stands for it, and only
 /// this one child of the parent is tested.
 struct Side {
+    /// The first number of the node: of one child, the one that it is in.
     node: usize,
-    /// The groups of four children to test.
-    parts: Range<usize>,
+    /// Whether the children under the next number, if it has any of the same node, are tested, too.
+    all: bool,
     /// The lanes of the children to test, of those that there are.
     lanes: u16,
 }
@@ -205,21 +206,18 @@ struct Side {
 impl Side {
     /// All children of an opened node.
     #[inline(always)]
-    fn opened(node: usize, count: usize) -> Self {
-        Self { node, parts: 0..count.div_ceil(4), lanes: u16::MAX }
+    fn opened(number: usize) -> Self {
+        Self { node: number, all: true, lanes: u16::MAX }
     }
 
-    /// One child, whose lanes are those of `lanes_of_first` if it is the first of a group, and one step further for each
-    /// before it.
+    /// One child, whose lanes are those of `lanes_of_first` if it is the first, and one step further for each before it.
     #[inline(always)]
     fn only(child: ChildRef, (lanes_of_first, step): (u16, usize)) -> Self {
-        let part = child.child() / 4;
-        let lanes = lanes_of_first << (step * (child.child() % 4));
-        Self { node: child.node(), parts: part..part + 1, lanes }
+        Self { node: child.node(), all: false, lanes: lanes_of_first << (step * child.child()) }
     }
 }
 
-/// The lanes of the first child of a group, as a child of A and of B, and the step to those of the next one.
+/// The lanes of the first child of four, as a child of A and of B, and the step to those of the next one.
 const LANES_OF_A: (u16, usize) = (0xf, 4);
 const LANES_OF_B: (u16, usize) = (0x1111, 1);
 
@@ -251,11 +249,11 @@ impl<W: Visitor> Task for Finish<'_, W> {
     }
 }
 
-/// Aligns an opened node of A to B's directions.
+/// Aligns children of A to B's directions.
 struct AlignA<'a> {
     node_filter: &'a NodeFilter,
-    node: &'a CachedNode,
-    to: &'a mut [Group; 2],
+    group: &'a Group,
+    to: &'a mut Group,
 }
 
 impl Task for AlignA<'_> {
@@ -263,17 +261,15 @@ impl Task for AlignA<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        for part in 0..self.node.count.div_ceil(4) {
-            self.node_filter.align_a(isa, &self.node.groups[part & 1], &mut self.to[part & 1]);
-        }
+        self.node_filter.align_a(isa, self.group, self.to);
     }
 }
 
-/// Aligns an opened node of B to A's directions. Of sweeps, it joins the slabs in both placements.
+/// Aligns children of B to A's directions. Of sweeps, it joins the slabs in both placements.
 struct AlignB<'a> {
     node_filter: &'a NodeFilter,
-    node: &'a CachedNode,
-    to: &'a mut [Group; 2],
+    group: &'a Group,
+    to: &'a mut Group,
     sweeps: bool,
 }
 
@@ -282,13 +278,10 @@ impl Task for AlignB<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
-        for part in 0..self.node.count.div_ceil(4) {
-            let (group, to) = (&self.node.groups[part & 1], &mut self.to[part & 1]);
-            if self.sweeps {
-                self.node_filter.align_b_at_both_ends(isa, group, to);
-            } else {
-                self.node_filter.align_b(isa, group, to);
-            }
+        if self.sweeps {
+            self.node_filter.align_b_at_both_ends(isa, self.group, self.to);
+        } else {
+            self.node_filter.align_b(isa, self.group, self.to);
         }
     }
 }
@@ -311,8 +304,8 @@ impl PairMemory {
         #[cfg(feature = "trace")]
         trace::objects(pair, [root_a.node, root_b.node]);
         self.left = (max_nodes(pair.object_a), max_nodes(pair.object_b));
-        self.aligned_a.start(self.walk);
-        self.aligned_b.start(self.walk);
+        self.aligned_a.start();
+        self.aligned_b.start();
         // The node above B's root meets no other node, but has a place.
         self.aligned_b.of(root_b.node);
         self.slabs.start(self.walk, pair);
@@ -328,11 +321,7 @@ impl PairMemory {
     /// Returns both leaf packets, if the entry is a pair of them.
     #[inline(always)]
     fn leaf_pair(&self, entry: Entry) -> Option<(LeafPacket, LeafPacket)> {
-        let (a, b) = (self.nodes.get(entry.a.node()), self.nodes.get(entry.b.node()));
-        if !a.is_leaf(entry.a.child()) | !b.is_leaf(entry.b.child()) {
-            return None;
-        }
-        Some((a.leaf(entry.a.child())?, b.leaf(entry.b.child())?))
+        Some((self.nodes.leaf(entry.a)?, self.nodes.leaf(entry.b)?))
     }
 }
 
@@ -449,9 +438,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     /// Visits the pairs of leaf packets that have been collected.
     #[inline(always)]
     fn visit_leaf_pairs<I: Isa>(&mut self, isa: I) -> Result<ControlFlow<()>, QueryError> {
-        let mut place = (0, 0);
-        while let Some((next, after)) = self.memory.leaf_pairs.next(place) {
-            place = after;
+        while let Some(next) = self.memory.leaf_pairs.take() {
             if next.bound > self.limit {
                 continue;
             }
@@ -462,7 +449,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 return Ok(ControlFlow::Break(()));
             }
         }
-        self.memory.leaf_pairs.clear();
         Ok(ControlFlow::Continue(()))
     }
 
@@ -481,38 +467,29 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     #[inline(always)]
     fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<[Side; 2], QueryError> {
         let (pair, tests) = (&self.pair, self.tests);
-        let PairMemory { node_filter, nodes, left, aligned_b, .. } = &mut *self.memory;
+        let PairMemory { node_filter, nodes, left, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
             let _stage = Stage::PrepareAlongB.enter();
             node_filter.look_along_b(isa);
         }
-        let (node_a, node_b) = (nodes.get(entry.a.node()), nodes.get(entry.b.node()));
-        let (child_a, child_b) = (entry.a.child(), entry.b.child());
-        let (leaf_a, leaf_b) = (node_a.is_leaf(child_a), node_b.is_leaf(child_b));
-        let (extent_a, extent_b) = (node_a.extents[child_a], node_b.extents[child_b]);
+        let (a, b) = (nodes.child(entry.a), nodes.child(entry.b));
         let mut side_a = Side::only(entry.a, LANES_OF_A);
         let mut side_b = Side::only(entry.b, LANES_OF_B);
-        let a_is_small = extent_b > EXTENT_RATIO_TO_OPEN_ONE * extent_a;
+        let a_is_small = b.extent > EXTENT_RATIO_TO_OPEN_ONE * a.extent;
         // In a forged file both comparisons may hold: one node is opened in any case.
-        let b_is_small = (extent_a > EXTENT_RATIO_TO_OPEN_ONE * extent_b) & !a_is_small;
+        let b_is_small = (a.extent > EXTENT_RATIO_TO_OPEN_ONE * b.extent) & !a_is_small;
         // One branch each, as far as a processor can predict any.
-        if !leaf_a & (leaf_b | !a_is_small) {
+        if !a.is_leaf() & (b.is_leaf() | !a_is_small) {
             let number = nodes.open(isa, pair.bvh_a, pair.object_a, entry.a, &mut left.0)?;
             #[cfg(feature = "trace")]
-            trace::opened(0, entry.a, number);
-            side_a = Side::opened(number, nodes.get(number).count);
+            trace::opened(0, nodes.place_in_treelet(entry.a), number);
+            side_a = Side::opened(number);
         }
-        if !leaf_b & (leaf_a | !b_is_small) {
+        if !b.is_leaf() & (a.is_leaf() | !b_is_small) {
             let number = nodes.open(isa, pair.bvh_b, pair.object_b, entry.b, &mut left.1)?;
             #[cfg(feature = "trace")]
-            trace::opened(1, entry.b, number);
-            side_b = Side::opened(number, nodes.get(number).count);
-            let (to, is_aligned) = aligned_b.of(number);
-            if !is_aligned {
-                let _stage = Stage::AlignB.enter();
-                let node = nodes.get(number);
-                isa.run(AlignB { node_filter, node, to, sweeps: W::SWEEPS });
-            }
+            trace::opened(1, nodes.place_in_treelet(entry.b), number);
+            side_b = Side::opened(number);
         }
         Ok([side_a, side_b])
     }
@@ -527,45 +504,52 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             &mut *self.memory;
         let node_filter = &**node_filter;
         let first_new = stack.len();
-        let (side_a, side_b) = (nodes.get(of_a.node), nodes.get(of_b.node));
-        // It was computed when it was opened. The node above the root never is; both roots are opened at once.
-        let aligned_b = aligned_b.get(of_b.node);
-        for part_a in of_a.parts {
-            for part_b in of_b.parts.clone() {
-                let tested = if phase == Phase::BestFirst { list.room() } else { stack.room() };
-                tested.a = ChildRef::new(of_a.node, 4 * part_a);
-                tested.b = ChildRef::new(of_b.node, 4 * part_b);
-                let groups = (&side_a.groups[part_a & 1], &side_b.groups[part_b & 1], &aligned_b[part_b & 1]);
-                let (lanes_a, lanes_b) = (&side_a.lanes[part_a & 1], &side_b.lanes[part_b & 1]);
-                let stage = Stage::TestAlongA.enter();
-                let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
-                stage.leave();
-                mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
-                if mask != 0 && slabs.are_due() {
+        let (mut number_a, mut number_b) = (of_a.node, of_b.node);
+        loop {
+            let (node_a, node_b) = (nodes.get(number_a), nodes.get(number_b));
+            // The node above the root of B is not aligned, but meets nothing: both roots are opened at once.
+            let (aligned, is_aligned) = aligned_b.of(number_b);
+            if !is_aligned {
+                let _stage = Stage::AlignB.enter();
+                isa.run(AlignB { node_filter, group: &node_b.group, to: aligned, sweeps: W::SWEEPS });
+            }
+            let tested = if phase == Phase::BestFirst { list.room() } else { stack.room() };
+            tested.a = ChildRef::new(number_a, 0);
+            tested.b = ChildRef::new(number_b, 0);
+            let groups = (&node_a.group, &node_b.group, &*aligned);
+            let (lanes_a, lanes_b) = (node_a.lanes, node_b.lanes);
+            let stage = Stage::TestAlongA.enter();
+            let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
+            stage.leave();
+            mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
+            if mask != 0 {
+                if slabs.are_due() {
                     let _stage = Stage::Slabs.enter();
+                    let numbers = (number_a, number_b);
+                    let memory = &mut *slabs;
                     mask = isa.run(TestSlabs {
-                        memory: slabs,
+                        memory,
                         node_filter,
                         measure,
                         nodes,
-                        numbers: (of_a.node, of_b.node),
+                        numbers,
                         limit,
                         tested,
                         mask,
                     });
                 }
                 if mask != 0 && node_filter.looks_along_b() {
-                    let (to, is_aligned) = aligned_a.of(of_a.node);
+                    let (to, is_aligned) = aligned_a.of(number_a);
                     if !is_aligned {
                         let _stage = Stage::AlignA.enter();
-                        isa.run(AlignA { node_filter, node: side_a, to });
+                        isa.run(AlignA { node_filter, group: &node_a.group, to });
                     }
                     let _stage = Stage::TestAlongB.enter();
-                    let groups = (&to[part_a & 1], &side_b.groups[part_b & 1]);
+                    let groups = (&*to, &node_b.group);
                     mask &= node_filter.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
                 }
                 if measure == Measure::Leaving && mask != 0 {
-                    let groups = (&side_a.groups[part_a & 1], &aligned_b[part_b & 1]);
+                    let groups = (&node_a.group, &*aligned);
                     mask &= node_filter.leaving(isa, groups, leaving_limit, &mut tested.bounds);
                 }
                 let stage = Stage::Keep.enter();
@@ -574,17 +558,26 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     leaf_pairs.append(tested, mask & leaves);
                     mask &= !leaves;
                 }
-                let first = match order {
-                    Order::Any => mask.trailing_zeros() as i32,
-                    _ => isa.nearest(&tested.bounds, mask),
-                };
-                match phase {
-                    Phase::DepthFirst => stack.push(mask, first),
-                    Phase::BestFirst => list.push(mask, first),
-                    Phase::Dive => stack.push(mask & 1u16 << (first & 15), first),
+                if mask != 0 {
+                    let first = match order {
+                        Order::Any => mask.trailing_zeros() as i32,
+                        _ => isa.nearest(&tested.bounds, mask),
+                    };
+                    match phase {
+                        Phase::DepthFirst => stack.push(mask, first),
+                        Phase::BestFirst => list.push(mask, first),
+                        Phase::Dive => stack.push(mask & 1u16 << (first & 15), first),
+                    }
                 }
                 stage.leave();
-                self.tests += 1;
+            }
+            self.tests += 1;
+            if node_b.continues & of_b.all {
+                number_b += 1;
+            } else if node_a.continues & of_a.all {
+                (number_a, number_b) = (number_a + 1, of_b.node);
+            } else {
+                break;
             }
         }
         if phase == Phase::Dive {

@@ -249,12 +249,9 @@ impl Task for Run<'_> {
             let codes = TurningCodes::read(page.treelet(0).first_chunk().expect("128 bytes"));
             decoded[side].decode(isa, &codes, &parent);
         }
-        let (mut seen_a, mut seen_b) = (Seen::zeroed(), Seen::zeroed());
-        self.test.see_a(isa, &decoded[0], &mut seen_a);
-        self.test.see_b(isa, &decoded[1], &mut seen_b);
         let mut bounds = [f32::NEG_INFINITY; 16];
-        let (a, b) = ((&decoded[0], &seen_a), (&decoded[1], &seen_b));
-        let mask = self.test.run(isa, self.measure, a, b, self.limit, &mut bounds);
+        let groups = (&decoded[0], &decoded[1]);
+        let mask = self.test.run(isa, self.measure, groups, self.limit, &mut bounds);
         (mask, bounds)
     }
 }
