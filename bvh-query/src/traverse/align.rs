@@ -230,7 +230,7 @@ fn spread<I: Isa>(isa: I, values: &[f32; 16], to: &mut [[f32; 16]; 4]) {
     }
 }
 
-/// Prepares a pose in a task, compiled apart from its caller, which rarely needs it.
+/// Prepares a pose in a task, compiled once for all walks.
 pub(crate) struct Prepare<'a> {
     pub(crate) alignment: &'a mut Alignment,
     pub(crate) placement: &'a Placement,

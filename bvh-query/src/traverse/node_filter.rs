@@ -139,13 +139,15 @@ impl NodeFilter {
         (self.set_a, self.set_b) =
             (pair.object_a.profile().directions(), pair.object_b.profile().directions());
         (self.reach_a, self.reach_b) = (reach_a, reach_b);
-        self.alignment.prepare(isa, pair.placement, self.set_b, reach_b.ends);
+        let (alignment, placement) = (&mut self.alignment, pair.placement);
+        isa.run(Prepare { alignment, placement, set: self.set_b, reach: reach_b.ends });
     }
 
     /// Prepares the other placement of B.
     #[inline(always)]
     pub(crate) fn prepare_end<I: Isa>(&mut self, isa: I, end: &Placement) {
-        self.end.prepare(isa, end, self.set_b, self.reach_b.ends);
+        let (alignment, set, reach) = (&mut self.end, self.set_b, self.reach_b.ends);
+        isa.run(Prepare { alignment, placement: end, set, reach });
     }
 
     /// Prepares `leaving` for a B that moves along a direction of about unit length.
