@@ -7,8 +7,8 @@
 //! children or triangles of one side), or 3 numbers in `f64` (`C`: the corners of a triangle).
 //!
 //! Decoding gives the same bits on every backend, because it uses exact products only, and so do operations on corners,
-//! which are not fused. Other operations may round differently (`mul_add` is fused where the CPU supports it), so their results are used only in filters
-//! with derived error bounds.
+//! which are not fused. Other operations may round differently (`mul_add` is fused where the CPU supports it), so their
+//! results are used only in filters with derived error bounds.
 
 /// Calls intrinsics whose features the token of a backend stands for.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]

@@ -149,9 +149,10 @@ pub(crate) struct PlacedPackets {
     keys: [u64; PACKETS_PER_SIDE],
     packets: Box<[PlacedPacket; PACKETS_PER_SIDE]>,
     query: u64,
-    /// For packets of A: the file and the unit of those that are kept, and whether they may be of another query.
+    /// The file and the unit of A's packets.
     of: (u64, u32),
-    is_open: bool,
+    /// Whether A's packets may be of another file or unit than the query needs.
+    may_be_others: bool,
 }
 
 impl Default for PlacedPackets {
@@ -161,7 +162,7 @@ impl Default for PlacedPackets {
             packets: Box::new([PlacedPacket::NONE; PACKETS_PER_SIDE]),
             query: 0,
             of: (0, 0),
-            is_open: false,
+            may_be_others: false,
         }
     }
 }
@@ -177,17 +178,17 @@ impl PlacedPackets {
         }
     }
 
-    /// Starts a query in which the packets are A's. They do not depend on where B is, so that they stay if `settle` finds that
-    /// they are of the same file and in the same unit.
-    pub(crate) fn reopen(&mut self) {
-        self.is_open = true;
+    /// Starts a query in which the packets are A's. They do not depend on where B is, so they stay until `forget_others` is
+    /// told of another file or unit.
+    pub(crate) fn start_with_known(&mut self) {
+        self.may_be_others = true;
     }
 
-    /// Forgets all packets if they are not of this file and in this unit. Only once a packet is needed, because most queries
-    /// need none.
+    /// Forgets all packets, if they are of another file or in another unit than these. It is called when the first packet is
+    /// needed, because most queries need none.
     #[inline(always)]
-    pub(crate) fn settle(&mut self, of: (u64, u32)) {
-        if std::mem::take(&mut self.is_open) && self.of != of {
+    pub(crate) fn forget_others(&mut self, of: (u64, u32)) {
+        if std::mem::take(&mut self.may_be_others) && self.of != of {
             self.of = of;
             self.start();
         }
@@ -236,13 +237,13 @@ mod tests {
         assert!(!packets.place(3, 5).is_known());
         for (of, stays) in [((1, 2), false), ((1, 2), true), ((1, 3), false), ((2, 3), false), ((2, 3), true)]
         {
-            packets.reopen();
-            packets.settle(of);
+            packets.start_with_known();
+            packets.forget_others(of);
             let mut place = packets.place(3, 5);
             assert_eq!(place.is_known(), stays, "{of:?}");
             place.keep();
             // Only the first packet of a query asks whether the others may stay.
-            packets.settle((9, 9));
+            packets.forget_others((9, 9));
             assert!(packets.place(3, 5).is_known());
             assert!(!packets.place(3, 6).is_known());
         }

@@ -1,8 +1,8 @@
 //! Decides exactly whether two triangles meet or are within a distance, and bounds how far apart they are.
 //!
-//! The other modules only filter: they pass each pair that a filter cannot decide to this one. No routine
-//! uses fused multiply-add or any other operation that depends on the platform, also where it computes for three corners
-//! at a time in the registers of a backend. So the answer is a function of the input numbers alone.
+//! The other modules only filter: they pass each pair that a filter cannot decide to this one. No routine uses fused
+//! multiply-add or any other operation that depends on the platform, even where it computes for three corners at a time in
+//! the registers of a backend. So the answer is a function of the input numbers alone.
 //!
 //! # Precondition: the range in which nothing under- or overflows
 //! Each coordinate is finite, at most 2^125 in magnitude and a multiple of 2^-266.

@@ -64,7 +64,7 @@ impl PlacedPair<'_> {
         packets: &'a mut PlacedPackets,
         leaf: LeafPacket,
     ) -> Result<&'a PlacedPacket, QueryError> {
-        packets.settle((self.pair.bvh_a.identity(), self.frame().scale.to_bits()));
+        packets.forget_others((self.pair.bvh_a.identity(), self.frame().scale.to_bits()));
         let mut place = packets.place(leaf.page, leaf.packet);
         if !place.is_known() {
             let _stage = Stage::Place.enter();

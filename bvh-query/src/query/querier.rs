@@ -56,10 +56,10 @@ pub(super) struct Ends {
 }
 
 impl Querier {
-    /// Forgets placed packets that are of no use in the next query.
+    /// Starts a query, for which placed packets of B are of no use.
     pub(super) fn start_packets(&mut self) {
         let [packets_a, packets_b] = &mut self.packets;
-        packets_a.reopen();
+        packets_a.start_with_known();
         packets_b.start();
     }
 

@@ -2,12 +2,14 @@
 
 pub(crate) mod align;
 pub(crate) mod budget;
+pub(crate) mod cached_node;
 pub(crate) mod decode;
 pub(crate) mod large_leaf;
 pub(crate) mod leaf_pairs;
 pub(crate) mod line_filter;
 pub(crate) mod node_cache;
 pub(crate) mod node_filter;
+mod open_child;
 pub(crate) mod packet_tree;
 pub(crate) mod pending;
 mod per_node;

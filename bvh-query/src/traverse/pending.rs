@@ -5,7 +5,7 @@
 //! bound is next.
 
 use crate::isa::{Isa, in_order};
-use crate::traverse::node_cache::ChildRef;
+use crate::traverse::cached_node::ChildRef;
 use std::hint::select_unpredictable;
 
 /// A pair of nodes to visit, and a lower bound of their distance; see `Measure`.
