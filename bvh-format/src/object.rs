@@ -82,7 +82,43 @@ pub struct Object {
     pub(crate) profile: Profile,
     pub(crate) triangle_encoding: TriangleEncoding,
     pub(crate) f16_scale: f32,
+    pub(crate) volumes: Volumes,
     pub(crate) record: ObjectRecord,
+}
+
+/// The bounding volumes of a record as `f64`, for each question to begin with. Lengths are in mesh units; all but `origin`
+/// are around the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Volumes {
+    /// The origin.
+    pub origin: [f64; 3],
+    /// The centre of the box, rounded to nearest.
+    pub box_centre: [f64; 3],
+    /// Half the sides of the box, rounded to nearest.
+    pub half_sides: [f64; 3],
+    /// The centre of the sphere.
+    pub sphere_centre: [f64; 3],
+    /// The radius of the sphere.
+    pub sphere_radius: f64,
+    /// The sum over the axes of the magnitudes of the origin and of both ends of the box, these three times: it bounds
+    /// whatever is added up to place a vertex.
+    pub magnitude: f64,
+}
+
+impl Volumes {
+    pub(crate) fn of(record: &ObjectRecord) -> Self {
+        let [lo, hi] = [record.box_lo, record.box_hi].map(|corner| corner.map(|v| f64::from(v.get())));
+        let origin = record.origin.map(|v| v.get());
+        let magnitude = |axis: usize| origin[axis].abs() + 3.0 * (lo[axis].abs() + hi[axis].abs());
+        Self {
+            origin,
+            box_centre: [0, 1, 2].map(|axis| (hi[axis] + lo[axis]) / 2.0),
+            half_sides: [0, 1, 2].map(|axis| (hi[axis] - lo[axis]) / 2.0),
+            sphere_centre: record.sphere_centre.map(|v| f64::from(v.get())),
+            sphere_radius: record.sphere_radius.get().into(),
+            magnitude: magnitude(0) + magnitude(1) + magnitude(2),
+        }
+    }
 }
 
 impl Object {
@@ -100,7 +136,13 @@ impl Object {
     /// `f64` for every stored vertex.
     #[inline]
     pub fn origin(&self) -> [f64; 3] {
-        self.record.origin.map(|value| value.get())
+        self.volumes.origin
+    }
+
+    /// The bounding volumes as numbers to compute with.
+    #[inline]
+    pub fn volumes(&self) -> &Volumes {
+        &self.volumes
     }
 
     /// The lower and the upper corner of the axis-aligned box of all stored vertices, in mesh units. The box is exact.
@@ -270,7 +312,8 @@ fn read_object(
     let triangle_encoding = TriangleEncoding::from_number(record.triangle_encoding)
         .ok_or_else(|| unknown(at + 133, "a triangle encoding from 0 to 2", record.triangle_encoding))?;
     let f16_scale = f32::from_bits(((record.f16_exponent.get() + 127) as u32) << 23);
-    Ok(Object { name: name.to_owned(), profile, triangle_encoding, f16_scale, record: *record })
+    let volumes = Volumes::of(record);
+    Ok(Object { name: name.to_owned(), profile, triangle_encoding, f16_scale, volumes, record: *record })
 }
 
 /// Returns true for multiples of 2^-149, the smallest positive f32.
@@ -344,8 +387,10 @@ mod tests {
         record.sphere_centre = [0.25, 0.5, -0.25].map(Into::into);
         record.sphere_radius = 4.0.into();
         let (profile, triangle_encoding) = (Profile::Dop14U8, TriangleEncoding::F32);
-        let object =
-            |record| Object { name: "a".to_owned(), profile, triangle_encoding, f16_scale: 1.0, record };
+        let object = |record| {
+            let volumes = Volumes::of(&record);
+            Object { name: "a".to_owned(), profile, triangle_encoding, f16_scale: 1.0, volumes, record }
+        };
         let exact = object(record);
         assert_eq!(exact.bounding_box(), [[999_999.0, -2.5, -3.0], [1_000_001.0, 1.5, 3.0]]);
         assert_eq!(exact.bounding_sphere(), ([1_000_000.25, 0.0, -0.25], 4.0));

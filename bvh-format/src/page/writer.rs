@@ -292,7 +292,7 @@ mod tests {
     use crate::decode::decode_child;
     use crate::ids::decode_id;
     use crate::leaf::decode_packet;
-    use crate::object::{Object, ObjectRecord};
+    use crate::object::{Object, ObjectRecord, Volumes};
     use crate::rule::Rule;
     use crate::treelet::Child;
     use crate::turning::{TurningDirection, decode_turning};
@@ -353,6 +353,7 @@ mod tests {
             profile,
             triangle_encoding: ENCODING,
             f16_scale: 2f32.powi(-12),
+            volumes: Volumes::of(&record),
             record,
         }
     }

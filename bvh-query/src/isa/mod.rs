@@ -117,24 +117,12 @@ pub(crate) enum Part {
     Faces,
 }
 
-/// The rows to pick, in two forms: for backends that load rows, and for those that pick lanes of registers.
-#[derive(Clone, Copy)]
-pub(crate) struct FourRows<'a> {
-    /// Where rows of a group start among its 128 numbers; upper ends start at 64.
-    pub(crate) starts: &'a [u32; 4],
-    /// Element `4 * i + j` is four times the place of row i in its part, plus j.
-    #[cfg_attr(
-        not(target_arch = "x86_64"),
-        allow(dead_code, reason = "only AVX-512 picks lanes of registers")
-    )]
-    pub(crate) lanes: &'a [u32; 16],
-}
-
-/// Returns four rows of a group, which start at these places.
+/// Returns four rows of a group, which start at the first four places, and the opposite ends of the same slabs.
 #[inline(always)]
-fn rows_at(group: &Group, starts: [u32; 4]) -> [&[f32; 4]; 4] {
+fn rows_at<'a>(group: &'a Group, [a, b, c, d, ..]: &[u32; 16]) -> [[&'a [f32; 4]; 4]; 2] {
     let numbers = group.rows().as_flattened();
-    starts.map(|start| numbers[(start & 124) as usize..].first_chunk().unwrap_or(&[0.0; 4]))
+    let row = |start: u32| numbers[(start & 124) as usize..].first_chunk().unwrap_or(&[0.0; 4]);
+    [[*a, *b, *c, *d], [a ^ 64, b ^ 64, c ^ 64, d ^ 64]].map(|starts| starts.map(row))
 }
 
 /// Returns an integer that is smaller for smaller numbers; none is NaN.
@@ -170,8 +158,20 @@ pub(crate) trait Isa: Copy {
     fn quad_splat(self, value: Self::V, column: usize) -> Self::V;
     /// Prepares a group for `pick`.
     fn rows<'a>(self, group: &'a Group) -> Self::Rows<'a>;
+    /// Prepares four calls of `pick`, for four of 16 rows each. The lowest five bits of a word are the row, 16 more for upper
+    /// ends; the next four are its place in its part.
+    ///
+    /// By default, `pick` loads rows: the first four elements are where they start among the 128 numbers of a group.
+    #[inline(always)]
+    fn places(self, rows: &[u32; 16], to: &mut [[u32; 16]; 4]) {
+        for (rows, to) in rows.as_chunks::<4>().0.iter().zip(to) {
+            for (row, start) in rows.iter().zip(to) {
+                *start = 4 * (row & 31);
+            }
+        }
+    }
     /// Returns four rows of a group, all of one part, and the opposite ends of the same slabs.
-    fn pick(self, rows: &Self::Rows<'_>, part: Part, four: FourRows<'_>) -> (Self::V, Self::V);
+    fn pick(self, rows: &Self::Rows<'_>, part: Part, places: &[u32; 16]) -> (Self::V, Self::V);
 
     /// Applies `bvh_format::quantize::round_step_up` to each lane.
     fn round_step_up(self, step: Self::V) -> Self::V;

@@ -2,7 +2,7 @@
 //! register; the rest follows.
 
 use super::corners::Three;
-use super::{FourRows, Isa, Lanes, Part, Task, in_order, rows_at};
+use super::{Isa, Lanes, Part, Task, in_order, rows_at};
 use bvh_format::slabs::Group;
 use std::marker::PhantomData;
 
@@ -183,9 +183,9 @@ impl<Q: Quad> Isa for Quads<Q> {
         group
     }
     #[inline(always)]
-    fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Four<Q>, Four<Q>) {
-        let others = four.starts.map(|start| start ^ 64);
-        (self.quads(rows_at(group, *four.starts)), self.quads(rows_at(group, others)))
+    fn pick(self, group: &&Group, _part: Part, places: &[u32; 16]) -> (Four<Q>, Four<Q>) {
+        let [ends, others] = rows_at(group, places);
+        (self.quads(ends), self.quads(others))
     }
     #[inline(always)]
     fn round_step_up(self, step: Four<Q>) -> Four<Q> {

@@ -67,7 +67,7 @@ impl Querier {
             return Ok(None);
         }
         self.queue.clear();
-        self.start_packets();
+        self.start_placed();
         let mut visitor = ContactVisitor {
             packets: &mut self.packets,
             order: Order::Nearest,
@@ -76,12 +76,12 @@ impl Querier {
                 queue: &mut self.queue,
                 drain_at: FIRST_DRAIN,
                 stats: QueryStats::default(),
-                recent: Default::default(),
+                recent: &mut self.recent,
                 visit: &mut |candidate| Ok(ControlFlow::Break(candidate)),
                 found: None,
             },
         };
-        let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
+        let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
         let Candidates { found, stats, .. } = visitor.candidates;
         self.stats.add(tests, stats);
@@ -108,7 +108,7 @@ pub(super) struct Candidates<'a> {
     pub(super) drain_at: usize,
     pub(super) stats: QueryStats,
     /// Of A and of B.
-    pub(super) recent: [RecentTriangles; 2],
+    pub(super) recent: &'a mut [RecentTriangles; 2],
     pub(super) visit: Visit<'a>,
     /// What `visit` broke with.
     pub(super) found: Option<TrianglePair>,
@@ -145,7 +145,7 @@ impl Candidates<'_> {
         let _stage = Stage::Exact.enter();
         self.stats.exact_tests += 1;
         let TrianglePair { a, b, lane_a, lane_b } = candidate;
-        let [recent_a, recent_b] = &mut self.recent;
+        let [recent_a, recent_b] = &mut *self.recent;
         let triangle_a = recent_a.get_or_place(a, lane_a, || self.placed.triangle_a(a, lane_a))?;
         let triangle_b = recent_b.get_or_place(b, lane_b, || self.placed.triangle_b(b, lane_b))?;
         Ok(triangles_intersect(triangle_a, triangle_b))

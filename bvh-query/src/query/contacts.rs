@@ -109,7 +109,7 @@ impl Querier {
         }
         self.queue.clear();
         self.bounded.clear();
-        self.start_packets();
+        self.start_placed();
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
         let budget = self.memory.budget;
         let mut contacts = 0;
@@ -122,19 +122,19 @@ impl Querier {
         };
         let visit = &mut |candidate| report(placed, candidate, &mut count);
         let (pair, memory, packets, queue) =
-            (placed.pair, &mut self.memory, &mut self.packets, &mut self.queue);
+            (&placed.pair, &mut self.memory, &mut self.packets, &mut self.queue);
         let (tests, stats, found) = if within == 0.0 {
             let candidates = Candidates {
                 placed,
                 queue,
                 drain_at: TriangleQueue::FULL,
                 stats: QueryStats::default(),
-                recent: Default::default(),
+                recent: &mut self.recent,
                 visit,
                 found: None,
             };
             let mut visitor = ContactVisitor { packets, order: Order::Any, candidates };
-            let tests = self.backend.run(Walk { pair, memory, visitor: &mut visitor })?;
+            let tests = self.backend.run(&mut Walk { pair, memory, visitor: &mut visitor })?;
             (tests, visitor.candidates.stats, visitor.candidates.found)
         } else {
             let (search, bounded) = (&mut Search::new(DistanceOptions::default(), within), &mut self.bounded);
@@ -142,7 +142,7 @@ impl Querier {
             let stats = QueryStats::default();
             let finalists = Finalists { placed, direction: None, search, each_within, queue, bounded, stats };
             let mut visitor = Nearest { packets, finalists };
-            let tests = self.backend.run(Walk { pair, memory, visitor: &mut visitor })?;
+            let tests = self.backend.run(&mut Walk { pair, memory, visitor: &mut visitor })?;
             let Finalists { stats, each_within, .. } = visitor.finalists;
             (tests, stats, each_within.and_then(|each| each.found))
         };

@@ -147,7 +147,7 @@ impl Querier {
                 return Ok(None);
             }
             self.queue.clear();
-            self.start_packets();
+            self.start_placed();
             self.bounded.clear();
             let finalists = Finalists {
                 placed,
@@ -159,7 +159,7 @@ impl Querier {
                 stats: QueryStats::default(),
             };
             let mut visitor = Nearest { packets: &mut self.packets, finalists };
-            let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
+            let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
             let tests = self.backend.run(task)?;
             let stats = visitor.finalists.stats;
             self.stats.add(tests, stats);

@@ -24,15 +24,19 @@ impl PlacedPair<'_> {
 
 /// The triangles of a side that were placed last, one for each lane. Candidates of two packets name a triangle up to
 /// four times, and unpacking and placing it takes a large part of an exact test.
-pub(super) struct RecentTriangles([(Option<(u32, u16)>, Triangle); PACKET]);
-
-impl Default for RecentTriangles {
-    fn default() -> Self {
-        Self([(None, [[0.0; 3]; 3]); PACKET])
-    }
+#[derive(Default)]
+pub(super) struct RecentTriangles {
+    /// The page and the packet of each triangle.
+    of: [Option<(u32, u16)>; PACKET],
+    triangles: [Triangle; PACKET],
 }
 
 impl RecentTriangles {
+    /// Forgets all triangles, before a query.
+    pub(super) fn start(&mut self) {
+        self.of = [None; PACKET];
+    }
+
     /// Returns the triangle in a lane of a packet, or what `place` returns, which is then kept.
     #[inline(always)]
     pub(super) fn get_or_place(
@@ -41,12 +45,13 @@ impl RecentTriangles {
         lane: u8,
         place: impl FnOnce() -> Result<Triangle, QueryError>,
     ) -> Result<&Triangle, QueryError> {
-        let (known, triangle) = &mut self.0[usize::from(lane) % PACKET];
-        if *known != Some((leaf.page, leaf.packet)) {
-            *triangle = place()?;
-            *known = Some((leaf.page, leaf.packet));
+        let lane = usize::from(lane) % PACKET;
+        let wanted = Some((leaf.page, leaf.packet));
+        if self.of[lane] != wanted {
+            self.triangles[lane] = place()?;
+            self.of[lane] = wanted;
         }
-        Ok(triangle)
+        Ok(&self.triangles[lane])
     }
 }
 

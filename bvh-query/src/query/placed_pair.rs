@@ -135,19 +135,20 @@ pub(super) fn each_pair<R>(
     Ok(None)
 }
 
-/// A walk with a visitor, compiled for each backend.
+/// A walk with a visitor, compiled for each backend. It is a task by reference: larger tasks are copied on their way, which
+/// takes as long as two node tests, because the copy must wait for what has just been written.
 pub(super) struct Walk<'a, W> {
-    pub(super) pair: ObjectPair<'a>,
+    pub(super) pair: &'a ObjectPair<'a>,
     pub(super) memory: &'a mut WalkMemory,
     pub(super) visitor: &'a mut W,
 }
 
-impl<W: Visitor> Task for Walk<'_, W> {
+impl<W: Visitor> Task for &mut Walk<'_, W> {
     type Output = Result<u64, QueryError>;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        let WalkMemory { pairs, budget, .. } = self.memory;
-        traverse(isa, self.pair, pairs, budget, self.visitor)
+        let WalkMemory { pairs, budget, .. } = &mut *self.memory;
+        traverse(isa, self.pair, pairs, budget, &mut *self.visitor)
     }
 }

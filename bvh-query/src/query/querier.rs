@@ -6,6 +6,7 @@ use crate::isa::{Backend, BackendError};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
+use crate::query::exact::RecentTriangles;
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::search::BoundedPair;
 use crate::traverse::budget::Budget;
@@ -39,6 +40,8 @@ pub struct Querier {
     pub(super) queue: TriangleQueue,
     /// Of A and of B.
     pub(super) packets: [PlacedPackets; 2],
+    /// Of A and of B.
+    pub(super) recent: [RecentTriangles; 2],
     /// For sweeps: what is in A's frame at the end of an interval.
     pub(super) at_end: Ends,
     pub(super) bounded: Vec<BoundedPair>,
@@ -56,11 +59,12 @@ pub(super) struct Ends {
 }
 
 impl Querier {
-    /// Starts a query, for which placed packets of B are of no use.
-    pub(super) fn start_packets(&mut self) {
+    /// Starts a query, for which placed triangles are of no use, except for packets of A.
+    pub(super) fn start_placed(&mut self) {
         let [packets_a, packets_b] = &mut self.packets;
         packets_a.start_with_known();
         packets_b.start();
+        self.recent.iter_mut().for_each(RecentTriangles::start);
     }
 
     /// Creates a querier with the fastest backend of this CPU, or with the one that the environment variable `CBVH_ISA`
@@ -80,6 +84,7 @@ impl Querier {
             memory: WalkMemory::default(),
             queue: TriangleQueue::default(),
             packets: Default::default(),
+            recent: Default::default(),
             at_end: Ends::default(),
             bounded: Vec::new(),
             bounded_triangles: Vec::new(),

@@ -60,6 +60,9 @@ impl Querier {
         b: Shape<'_>,
         pose: &Pose,
     ) -> Result<Option<[f64; 3]>, QueryError> {
+        if !a.is_solid() && !b.is_solid() {
+            return Ok(None);
+        }
         let (own, placed) = (PlacedShape::from(a), b.at(pose));
         let mut found = None;
         if b.is_solid() {

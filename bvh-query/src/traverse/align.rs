@@ -11,7 +11,7 @@
 //! 2^-150 each, and twice that is charged. All go into the offsets, outward, once a query; a node test costs
 //! nothing for it.
 
-use crate::isa::{FourRows, Isa, Lanes, Part, Task};
+use crate::isa::{Isa, Lanes, Part, Task};
 use crate::traverse::placement::Placement;
 use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::realign::{cone, magnitudes, rows_by_cone};
@@ -29,9 +29,8 @@ const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 /// have no meaning.
 #[repr(C, align(64))]
 pub(crate) struct Alignment {
-    /// Where each term's end is taken from, `[term]`, as lanes and as starts of rows: see `FourRows`.
-    lanes: [[[u32; 16]; 4]; 3],
-    starts: [[u32; 16]; 3],
+    /// Where each term's end is taken from, `[term]`, as `Isa::pick` reads it.
+    places: [[[u32; 16]; 4]; 3],
     coefficients: [[[f32; 16]; 4]; 3],
     offset_lo: [[f32; 16]; 4],
     offset_hi: [[f32; 16]; 4],
@@ -54,39 +53,34 @@ pub(super) const FACTORS_BY_AXIS: [[f64; 16]; 3] = {
     factors
 };
 
-/// Where the ends of the rows of `rows_by_cone` stand in their `Part`: each of the terms of a set keeps to one.
-const PLACES: [[u32; 64]; 3] = {
-    let sets = [DirectionSet::Dop6, DirectionSet::Dop14, DirectionSet::Dop26];
-    let mut places = [[0; 64]; 3];
-    let mut set = 0;
-    while set < 3 {
-        let rows = rows_by_cone(sets[set]);
-        let mut cone = 0;
-        while cone < 64 {
-            let mut term = 0;
-            while term < 3 {
-                let end = rows[cone] >> (8 * term) & 31;
-                let row = end & 15;
-                let place = match row {
-                    0..3 => row,
-                    3..8 => row - 3,
-                    _ => (row & 3) + 2 * (row & 4),
-                };
-                places[set][cone] |= (place + end / 16 * 4) << (8 * term);
-                term += 1;
-            }
-            cone += 1;
+/// For each cone of a set, the three ends that make up the upper end, ten bits each: the row, and in the higher five the
+/// place in its `Part`. Each of the terms of a set keeps to one part.
+const fn ends_by_cone(set: DirectionSet) -> [u32; 64] {
+    let rows = rows_by_cone(set);
+    let mut ends = [0; 64];
+    let mut cone = 0;
+    while cone < 64 {
+        let mut term = 0;
+        while term < 3 {
+            let end = rows[cone] >> (8 * term) & 31;
+            let row = end & 15;
+            let place = match row {
+                0..3 => row,
+                3..8 => row - 3,
+                _ => (row & 3) + 2 * (row & 4),
+            };
+            ends[cone] |= (end | (place + end / 16 * 4) << 5) << (10 * term);
+            term += 1;
         }
-        set += 1;
+        cone += 1;
     }
-    places
-};
+    ends
+}
 
 impl Alignment {
     /// An empty alignment, before the first pose is prepared.
     pub(crate) const NONE: Self = Self {
-        starts: [[0; 16]; 3],
-        lanes: [[[0; 16]; 4]; 3],
+        places: [[[0; 16]; 4]; 3],
         coefficients: [[[0.0; 16]; 4]; 3],
         offset_lo: [[0.0; 16]; 4],
         offset_hi: [[0.0; 16]; 4],
@@ -132,32 +126,19 @@ impl Alignment {
                 (rounded[0], rounded[1], rounded[2]);
             (offset_lo[row], offset_hi[row]) = ((offset - error) as f32, (offset + error) as f32);
         }
-        let (rows, places) = match set {
-            DirectionSet::Dop6 => (const { &rows_by_cone(DirectionSet::Dop6) }, &PLACES[0]),
-            DirectionSet::Dop14 => (const { &rows_by_cone(DirectionSet::Dop14) }, &PLACES[1]),
-            DirectionSet::Dop26 => (const { &rows_by_cone(DirectionSet::Dop26) }, &PLACES[2]),
+        let ends = match set {
+            DirectionSet::Dop6 => const { &ends_by_cone(DirectionSet::Dop6) },
+            DirectionSet::Dop14 => const { &ends_by_cone(DirectionSet::Dop14) },
+            DirectionSet::Dop26 => const { &ends_by_cone(DirectionSet::Dop26) },
         };
-        let (mut rows_of, mut places_of) = ([0; 16], [0; 16]);
-        for row in 0..16 {
-            let cone = (cones[row] & 63) as usize;
-            (rows_of[row], places_of[row]) = (rows[cone], places[cone]);
-        }
+        let ends = cones.map(|cone| ends[(cone & 63) as usize]);
         for (term, coefficients) in coefficients.iter_mut().enumerate() {
-            let mut first = [0.0; 16];
+            let ends = ends.map(|ends| ends >> (10 * term));
             for row in 0..16 {
-                let end = rows_of[row] >> (8 * term) & 31;
-                self.starts[term][row] = 4 * end;
                 // The coefficients of lower ends, which have rows below 16, are negative.
-                coefficients[row] = f32::from_bits(coefficients[row].to_bits() ^ (!end & 16) << 27);
-                first[row] = f32::from_bits(4 * (places_of[row] >> (8 * term) & 15));
+                coefficients[row] = f32::from_bits(coefficients[row].to_bits() ^ (!ends[row] & 16) << 27);
             }
-            for q in 0..4 {
-                let mut lanes = [0.0; 16];
-                isa.store(isa.repeat(&first.as_chunks::<4>().0[q]), &mut lanes);
-                for lane in 0..16 {
-                    self.lanes[term][q][lane] = lanes[lane].to_bits() | lane as u32 & 3;
-                }
-            }
+            isa.places(&ends, &mut self.places[term]);
             spread(isa, coefficients, &mut self.coefficients[term]);
         }
         spread(isa, &offset_lo, &mut self.offset_lo);
@@ -208,9 +189,7 @@ impl Alignment {
         for q in 0..REGISTERS {
             let (mut lo, mut hi) = (isa.load(&self.offset_lo[q]), isa.load(&self.offset_hi[q]));
             for term in 0..3 {
-                let four =
-                    FourRows { starts: &self.starts[term].as_chunks().0[q], lanes: &self.lanes[term][q] };
-                let (end, other) = isa.pick(&rows, parts[term], four);
+                let (end, other) = isa.pick(&rows, parts[term], &self.places[term][q]);
                 let coefficients = isa.load(&self.coefficients[term][q]);
                 // Not fused, so that the ends, and with them the order of visits, are the same on every backend.
                 hi = end.mul(coefficients).add(hi);

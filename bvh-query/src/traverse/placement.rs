@@ -23,25 +23,13 @@ impl Placement {
     pub(crate) const NONE: Self = Self { rotation: [[0.0; 3]; 3], translation: [0.0; 3], error: 0.0 };
 
     pub(crate) fn new(pose: &Pose, a: &Object, b: &Object) -> Self {
-        let (record_a, record_b) = (a.record(), b.record());
-        let mut origin = [[0.0; 3]; 2];
-        let mut magnitude = 0.0;
-        for axis in 0..3 {
-            origin[0][axis] = record_a.origin[axis].get();
-            origin[1][axis] = record_b.origin[axis].get();
-            magnitude += origin[0][axis].abs() + origin[1][axis].abs() + pose.translation()[axis].abs();
-            // Three times the largest coordinate, and more: the sum over the axes of both ends.
-            for record in [record_a, record_b] {
-                let (lo, hi) = (record.box_lo[axis].get(), record.box_hi[axis].get());
-                magnitude += 3.0 * f64::from(lo.abs() + hi.abs());
-            }
-        }
-        let placed = pose.place(origin[1]);
-        let [x, y, z] = origin[0];
+        let (a, b) = (a.volumes(), b.volumes());
+        let [x, y, z] = pose.translation();
+        let placed = pose.place(b.origin);
         Self {
             rotation: *pose.rotation(),
-            translation: [placed[0] - x, placed[1] - y, placed[2] - z],
-            error: magnitude * POSE_ERROR,
+            translation: [0, 1, 2].map(|axis| placed[axis] - a.origin[axis]),
+            error: (a.magnitude + b.magnitude + x.abs() + y.abs() + z.abs()) * POSE_ERROR,
         }
     }
 

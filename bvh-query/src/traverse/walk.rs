@@ -156,13 +156,13 @@ pub(crate) struct PairMemory {
 #[inline(always)]
 pub(crate) fn traverse<I: Isa, W: Visitor>(
     isa: I,
-    pair: ObjectPair<'_>,
+    pair: &ObjectPair<'_>,
     memory: &mut PairMemory,
     budget: &mut Budget,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
     let _stage = Stage::Walk.enter();
-    memory.start(isa, &pair, W::SWEEPS)?;
+    memory.start(isa, pair, W::SWEEPS)?;
     if W::MEASURE == Measure::Leaving {
         memory.node_filter.prepare_ways(visitor.direction());
     }
@@ -180,7 +180,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
 
 /// A walk of two objects.
 struct PairWalk<'a, 'p, W> {
-    pair: ObjectPair<'p>,
+    pair: &'a ObjectPair<'p>,
     memory: &'a mut PairMemory,
     budget: &'a mut Budget,
     visitor: &'a mut W,
@@ -461,13 +461,13 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         }
         let _stage = Stage::LargeLeaf.enter();
         let PairMemory { node_filter, nodes, large_leaves, .. } = &mut *self.memory;
-        large_leaves.are_beyond(&self.pair, nodes, node_filter.reaches(), entry, gap_limit::<W>(self.limit))
+        large_leaves.are_beyond(self.pair, nodes, node_filter.reaches(), entry, gap_limit::<W>(self.limit))
     }
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
     #[inline(always)]
     fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<[Side; 2], QueryError> {
-        let (pair, tests) = (&self.pair, self.tests);
+        let (pair, tests) = (self.pair, self.tests);
         let PairMemory { node_filter, nodes, left, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
             let _stage = Stage::PrepareAlongB.enter();

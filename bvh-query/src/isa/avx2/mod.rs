@@ -4,7 +4,7 @@
 //! the CPU, and a `Y`, `X` or `D` can be made only with an `Avx2`, or a `D` with an `Avx512`.
 
 use super::corners::Corners;
-use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
+use super::{Isa, Lanes, Part, Task, rows_at};
 use bvh_format::slabs::Group;
 use bvh_format::treelet::SHORT_CODES;
 use std::arch::x86_64::*;
@@ -243,9 +243,9 @@ impl Isa for Avx2 {
         group
     }
     #[inline(always)]
-    fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Y, Y) {
-        let others = four.starts.map(|start| start ^ 64);
-        (self.quads(rows_at(group, *four.starts)), self.quads(rows_at(group, others)))
+    fn pick(self, group: &&Group, _part: Part, places: &[u32; 16]) -> (Y, Y) {
+        let [ends, others] = rows_at(group, places);
+        (self.quads(ends), self.quads(others))
     }
     #[inline(always)]
     fn round_step_up(self, step: Y) -> Y {

@@ -4,7 +4,7 @@
 //! the CPU, and a `Z` or `X` can be made only with an `Avx512`.
 
 use super::avx2::{D, short_codes};
-use super::{FourRows, Isa, Lanes, Part, Task};
+use super::{Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
 use std::arch::x86_64::*;
 
@@ -181,9 +181,24 @@ impl Isa for Avx512 {
         let faces = [self.load(&lo[2]), self.load(&hi[2])];
         [axes, cube, faces, [self.load(&lo[3]), self.load(&hi[3])]]
     }
+    /// Element `4 * i + j` is four times the place of row i in its part, plus j.
     #[inline(always)]
-    fn pick(self, [axes, cube, faces, more]: &[[Z; 2]; 4], part: Part, four: FourRows<'_>) -> (Z, Z) {
-        let at = four.lanes;
+    fn places(self, rows: &[u32; 16], to: &mut [[u32; 16]; 4]) {
+        with_features!({
+            let rows = _mm512_loadu_si512(rows.as_ptr().cast());
+            // (rows >> 3) & 60
+            let firsts = _mm512_and_si512(_mm512_srli_epi32::<3>(rows), _mm512_set1_epi32(60));
+            for (four, to) in to.iter_mut().enumerate() {
+                let of = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+                let of = _mm512_or_si512(of, _mm512_set1_epi32(4 * four as i32));
+                let lanes = _mm512_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
+                let places = _mm512_or_si512(_mm512_permutexvar_epi32(of, firsts), lanes);
+                _mm512_storeu_si512(to.as_mut_ptr().cast(), places);
+            }
+        });
+    }
+    #[inline(always)]
+    fn pick(self, [axes, cube, faces, more]: &[[Z; 2]; 4], part: Part, at: &[u32; 16]) -> (Z, Z) {
         match part {
             Part::Axes => self.pick_of(axes, at),
             Part::Cube => self.pick_of(cube, at),

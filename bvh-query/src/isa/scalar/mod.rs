@@ -1,7 +1,7 @@
 //! The portable backend: arrays, one element at a time. It defines the results of the other backends.
 
 use super::corners::Three;
-use super::{FourRows, Isa, Lanes, Part, Task, rows_at};
+use super::{Isa, Lanes, Part, Task, rows_at};
 use bvh_format::ordered::from_ordered;
 use bvh_format::quantize::round_step_up;
 use bvh_format::slabs::Group;
@@ -132,9 +132,9 @@ impl Isa for Scalar {
         group
     }
     #[inline(always)]
-    fn pick(self, group: &&Group, _part: Part, four: FourRows<'_>) -> (Array<16>, Array<16>) {
-        let others = four.starts.map(|start| start ^ 64);
-        (self.quads(rows_at(group, *four.starts)), self.quads(rows_at(group, others)))
+    fn pick(self, group: &&Group, _part: Part, places: &[u32; 16]) -> (Array<16>, Array<16>) {
+        let [ends, others] = rows_at(group, places);
+        (self.quads(ends), self.quads(others))
     }
     #[inline(always)]
     fn round_step_up(self, step: Array<16>) -> Array<16> {

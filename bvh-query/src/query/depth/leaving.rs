@@ -71,7 +71,7 @@ impl Querier {
             return Ok(());
         }
         self.queue.clear();
-        self.start_packets();
+        self.start_placed();
         let way = Way { direction: line.direction, length: line.length, error: line.error };
         let visit = &mut |pair: TrianglePair| {
             let a = placed.triangle_a(pair.a, pair.lane_a)?;
@@ -92,13 +92,13 @@ impl Querier {
             queue: &mut self.queue,
             drain_at: FIRST_DRAIN,
             stats: QueryStats::default(),
-            recent: Default::default(),
+            recent: &mut self.recent,
             visit,
             found: None,
         };
         let contacts = ContactVisitor { packets: &mut self.packets, order: Order::Nearest, candidates };
         let mut visitor = LeavingVisitor { contacts, direction: line.direction, found };
-        let task = Walk { pair: placed.pair, memory: &mut self.memory, visitor: &mut visitor };
+        let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
         let stats = visitor.contacts.candidates.stats;
         self.stats.add(tests, stats);

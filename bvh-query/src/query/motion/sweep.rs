@@ -42,7 +42,7 @@ impl Querier {
         let pair = ObjectPair { placement: &start, end: &end, ..placed.pair };
         self.queue.clear();
         self.at_end.queue.clear();
-        self.start_packets();
+        self.start_placed();
         self.at_end.packets.start();
         let mut visitor = Swept {
             packets: &mut self.packets,
@@ -57,7 +57,7 @@ impl Querier {
                 stats: QueryStats::default(),
             },
         };
-        let task = Walk { pair, memory: &mut self.memory, visitor: &mut visitor };
+        let task = &mut Walk { pair: &pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
         let (stats, is_whole) = (visitor.candidates.stats, !visitor.candidates.is_full());
         self.stats.add(tests, stats);
