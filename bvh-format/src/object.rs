@@ -86,8 +86,8 @@ pub struct Object {
     pub(crate) record: ObjectRecord,
 }
 
-/// The bounding volumes of a record as `f64`, for each question to begin with. Lengths are in mesh units; all but `origin`
-/// are around the origin.
+/// The bounding volumes of an object in `f64`, as computations need them. Lengths are in mesh units, and centres are relative
+/// to the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volumes {
     /// The origin.
@@ -100,8 +100,8 @@ pub struct Volumes {
     pub sphere_centre: [f64; 3],
     /// The radius of the sphere.
     pub sphere_radius: f64,
-    /// The sum over the axes of the magnitudes of the origin and of both ends of the box, these three times: it bounds
-    /// whatever is added up to place a vertex.
+    /// The sum, over the axes, of the magnitude of the origin and three times the magnitudes of both ends of the box. It bounds
+    /// the numbers that are added up when a vertex is placed.
     pub magnitude: f64,
 }
 
@@ -139,7 +139,7 @@ impl Object {
         self.volumes.origin
     }
 
-    /// The bounding volumes as numbers to compute with.
+    /// The bounding volumes in `f64`.
     #[inline]
     pub fn volumes(&self) -> &Volumes {
         &self.volumes
@@ -392,6 +392,11 @@ mod tests {
             Object { name: "a".to_owned(), profile, triangle_encoding, f16_scale: 1.0, volumes, record }
         };
         let exact = object(record);
+        let Volumes { origin, box_centre, half_sides, sphere_centre, sphere_radius, magnitude } =
+            exact.volumes;
+        assert_eq!([origin, box_centre, half_sides], [[1e6, -0.5, 0.0], [0.0; 3], [1.0, 2.0, 3.0]]);
+        assert_eq!((sphere_centre, sphere_radius), ([0.25, 0.5, -0.25], 4.0));
+        assert_eq!(magnitude, 1e6 + 0.5 + 3.0 * 12.0);
         assert_eq!(exact.bounding_box(), [[999_999.0, -2.5, -3.0], [1_000_001.0, 1.5, 3.0]]);
         assert_eq!(exact.bounding_sphere(), ([1_000_000.25, 0.0, -0.25], 4.0));
         // The last bits of the centre do not fit beside the origin: the radius makes up for them.

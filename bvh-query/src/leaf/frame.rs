@@ -24,12 +24,7 @@ pub(crate) struct LocalFrame {
 
 impl LocalFrame {
     pub(crate) fn new(placement: &Placement, a: &Object, b: &Object) -> Self {
-        let size = |object: &Object| {
-            let record = object.record();
-            (0..3).fold(0.0f64, |m, i| {
-                m.max(f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()))
-            })
-        };
+        let size = |object: &Object| object.volumes().half_sides.into_iter().fold(0.0, f64::max) * 2.0;
         let scale = scale_of(size(a).max(size(b)));
         let rotation32 = placement.rotation.map(|row| row.map(|r| (r * scale) as f32));
         Self {

@@ -135,8 +135,8 @@ pub(super) fn each_pair<R>(
     Ok(None)
 }
 
-/// A walk with a visitor, compiled for each backend. It is a task by reference: larger tasks are copied on their way, which
-/// takes as long as two node tests, because the copy must wait for what has just been written.
+/// A walk with a visitor, compiled for each backend. It is a task by reference, because a large task is copied before it runs,
+/// and the copy waits for what has just been written.
 pub(super) struct Walk<'a, W> {
     pub(super) pair: &'a ObjectPair<'a>,
     pub(super) memory: &'a mut WalkMemory,

@@ -10,7 +10,7 @@
 //! `squared_gap`. A relative translation below 2^-213 counts as 0, for which each box is larger by 2^-211.
 
 use crate::pose::Pose;
-use bvh_format::object::Object;
+use bvh_format::object::{Object, Volumes};
 
 /// The share of the magnitudes by which a box is enlarged.
 const ERROR: f64 = 1.0 / (1u64 << 43) as f64;
@@ -95,22 +95,21 @@ pub(super) struct Extent {
     /// The middle and the radius of the sphere. The radius is larger by 2^-19, because poses may stretch by 2^-20.
     middle: [f64; 3],
     radius: f64,
-    /// The sum of the magnitudes of the radius, the origin and the ends of the box.
+    /// At least the sum of the magnitudes of the radius, the origin and the ends of the box.
     magnitude: f64,
 }
 
 impl Extent {
     pub(super) fn of(object: &Object) -> Self {
-        let (record, origin) = (object.record(), object.origin());
-        let ends = [0, 1, 2].map(|k| [record.box_lo[k], record.box_hi[k]].map(|end| f64::from(end.get())));
-        let radius = f64::from(record.sphere_radius.get()) * (1.0 + 1.0 / (1 << 19) as f64);
-        let magnitude = |k: usize| origin[k].abs() + ends[k][0].abs() + ends[k][1].abs();
+        let Volumes { origin, box_centre, half_sides, sphere_centre, sphere_radius, magnitude } =
+            *object.volumes();
+        let radius = sphere_radius * (1.0 + 1.0 / (1 << 19) as f64);
         Self {
-            centre: [0, 1, 2].map(|k| origin[k] + (ends[k][0] + ends[k][1]) / 2.0),
-            half: [0, 1, 2].map(|k| (ends[k][1] - ends[k][0]) / 2.0),
-            middle: [0, 1, 2].map(|k| origin[k] + f64::from(record.sphere_centre[k].get())),
+            centre: [0, 1, 2].map(|k| origin[k] + box_centre[k]),
+            half: half_sides,
+            middle: [0, 1, 2].map(|k| origin[k] + sphere_centre[k]),
             radius,
-            magnitude: radius + magnitude(0) + magnitude(1) + magnitude(2),
+            magnitude: radius + magnitude,
         }
     }
 }
