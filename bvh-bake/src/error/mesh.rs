@@ -59,7 +59,7 @@ pub enum InputError {
     /// A vertex that a triangle uses has a coordinate outside what the format stores.
     #[error(
         "object \"{object}\", triangle {triangle}, vertex {vertex}: expected finite coordinates of at most \
-         2^120 in magnitude, found {found}"
+         2^120 in magnitude, found {found:e}"
     )]
     Coordinate {
         /// The object's name, shortened.

@@ -17,16 +17,28 @@ use std::io::Read;
 /// The most elements and properties of a header, which are kept in memory.
 const MAX_DECLARED: u64 = 1 << 14;
 
-/// Takes the vertices and faces of a file in order. Either kind may come first.
-pub(crate) trait Faces {
-    /// Returns the number of vertices taken.
-    fn vertices(&self) -> u64;
-    /// Takes the next vertex.
-    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt>;
-    /// Takes the next vertex, which has a coordinate that the format cannot hold. `place` is where that coordinate is.
-    fn misfit(&mut self, place: Place, found: f64) -> Result<(), Halt>;
-    /// Takes the next face. Its vertices may come later.
-    fn face(&mut self, corners: &[u32]) -> Result<(), Halt>;
+/// What becomes of the vertices and faces of a file, of which either may come first.
+enum Sink<'a> {
+    Faces(&'a mut IndexedFaces),
+    /// Nothing, but the place of a coordinate of this vertex that the format cannot hold is reported.
+    MisfitOf(u64),
+}
+
+impl Sink<'_> {
+    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt> {
+        match self {
+            Self::Faces(faces) => Ok(faces.add_vertices(&[position])?),
+            Self::MisfitOf(_) => Ok(()),
+        }
+    }
+
+    /// Takes a face. Its vertices may come later.
+    fn face(&mut self, corners: &[u32]) -> Result<(), Halt> {
+        match self {
+            Self::Faces(faces) => Ok(faces.add_run(corners.len() as u32, 1, 0, 0, corners)?),
+            Self::MisfitOf(_) => Ok(()),
+        }
+    }
 }
 
 /// Reads a file into `faces`. After a success, all their corners are vertices that the format can hold. `open` opens
@@ -35,7 +47,7 @@ pub(crate) fn read<R: Read>(
     open: impl Fn(bool) -> Result<ByteReader<R>, Halt>,
     faces: &mut IndexedFaces,
 ) -> Result<(), Halt> {
-    stream(open(true)?, faces)?;
+    stream(open(true)?, Sink::Faces(faces))?;
     faces.finish()?;
     if let Some((_, corner)) = faces.first_out_of_range()? {
         let expected = format!("vertex numbers below {}", faces.vertex_count());
@@ -44,16 +56,15 @@ pub(crate) fn read<R: Read>(
     match faces.first_misfit(None)? {
         None => Ok(()),
         Some((_, vertex)) => {
-            let vertex = vertex.into();
             // The second reading meets the misfit again and reports its place.
-            stream(open(false)?, &mut MisfitFinder { vertex, vertices: 0 })?;
+            stream(open(false)?, Sink::MisfitOf(vertex.into()))?;
             Err(changed_meanwhile().into())
         }
     }
 }
 
 /// Reads a file from its beginning to its end.
-fn stream<R: Read>(reader: ByteReader<R>, faces: &mut impl Faces) -> Result<(), Halt> {
+fn stream<R: Read>(reader: ByteReader<R>, sink: Sink<'_>) -> Result<(), Halt> {
     let mut words = Words::new(reader);
     let header = match Header::read(&mut words) {
         Ok(header) => header,
@@ -62,7 +73,7 @@ fn stream<R: Read>(reader: ByteReader<R>, faces: &mut impl Faces) -> Result<(), 
     let format = header.format;
     let mut body = Body { words, format };
     let has_faces = header.elements.iter().any(|element| element.name == "face");
-    let mut reader = Reader { faces, corners: Vec::new(), triangles: 0, has_faces };
+    let mut reader = Reader { sink, corners: Vec::new(), vertices: 0, triangles: 0, has_faces };
     let result = header.elements.iter().try_for_each(|element| {
         body.expect_room(element)?;
         reader.read_element(element, &mut body)
@@ -309,21 +320,24 @@ impl<R: Read> Body<R> {
             return Ok(number as u32);
         }
         let place = if self.format == Format::Ascii { self.place() } else { before };
-        Err(Fault::new(place, format!("{what} from 0 to {most}"), number.to_string()))
+        let found = if number.abs() < 1e15 { number.to_string() } else { format!("{number:e}") };
+        Err(Fault::new(place, format!("{what} from 0 to {most}"), found))
     }
 }
 
 /// Reads the elements of a body.
-struct Reader<'a, F> {
-    faces: &'a mut F,
+struct Reader<'a> {
+    sink: Sink<'a>,
     /// The corners of the current face.
     corners: Vec<u32>,
+    /// How many vertices and triangles there were.
+    vertices: u64,
     triangles: u64,
     /// Whether there is an element of faces. Without it, vertices are points.
     has_faces: bool,
 }
 
-impl<F: Faces> Reader<'_, F> {
+impl Reader<'_> {
     fn read_element<R: Read>(&mut self, element: &Element, body: &mut Body<R>) -> Result<(), Halt> {
         if element.properties.is_empty() {
             return Ok(());
@@ -342,9 +356,13 @@ impl<F: Faces> Reader<'_, F> {
                     }
                     (None, Role::Coordinate(axis)) => {
                         position[axis] = body.number(property.kind)?;
-                        if !coordinate_fits(position[axis]) {
+                        // A misfit is an error only if a face uses it.
+                        if !coordinate_fits(position[axis])
+                            && matches!(self.sink, Sink::MisfitOf(vertex) if vertex == self.vertices)
+                        {
                             let place = if body.format == Format::Ascii { body.place() } else { place };
-                            self.faces.misfit(place, position[axis])?;
+                            let found = format!("{:e}", position[axis]);
+                            return Err(Fault::new(place, COORDINATE, found).into());
                         }
                     }
                     (None, _) => {
@@ -353,18 +371,19 @@ impl<F: Faces> Reader<'_, F> {
                 }
             }
             if is_vertex {
-                if self.faces.vertices() == MAX_VERTICES {
+                if self.vertices == MAX_VERTICES {
                     let (place, most) = (body.place(), MAX_VERTICES);
                     return Err(Fault::Limit { place, most, what: "vertices" }.into());
                 }
-                let number = self.faces.vertices();
-                self.faces.vertex(position)?;
+                let number = self.vertices;
+                self.vertices += 1;
+                self.sink.vertex(position)?;
                 if !self.has_faces {
                     if number == MAX_TRIANGLES {
                         let (place, most) = (body.place(), MAX_TRIANGLES);
                         return Err(Fault::Limit { place, most, what: "points" }.into());
                     }
-                    self.faces.face(&[number as u32; 3])?;
+                    self.sink.face(&[number as u32; 3])?;
                 }
             }
         }
@@ -385,59 +404,11 @@ impl<F: Faces> Reader<'_, F> {
             return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" }.into());
         }
         // If the vertices come first, a wrong number is reported at its place.
-        let vertices = self.faces.vertices();
-        let last = if vertices > 0 { vertices - 1 } else { MAX_VERTICES - 1 };
+        let last = if self.vertices > 0 { self.vertices - 1 } else { MAX_VERTICES - 1 };
         self.corners.clear();
         for _ in 0..arity {
             self.corners.push(body.whole(kind, last, "a vertex number")?);
         }
-        self.faces.face(&self.corners)
-    }
-}
-
-impl Faces for IndexedFaces {
-    fn vertices(&self) -> u64 {
-        self.vertex_count()
-    }
-
-    fn vertex(&mut self, position: [f64; 3]) -> Result<(), Halt> {
-        Ok(self.add_vertices(&[position])?)
-    }
-
-    fn misfit(&mut self, _: Place, _: f64) -> Result<(), Halt> {
-        // A misfit is an error only if a face uses it.
-        Ok(())
-    }
-
-    fn face(&mut self, corners: &[u32]) -> Result<(), Halt> {
-        Ok(self.add_run(corners.len() as u32, 1, 0, 0, corners)?)
-    }
-}
-
-/// Finds the place of a vertex that a face uses and that the format cannot hold.
-struct MisfitFinder {
-    vertex: u64,
-    vertices: u64,
-}
-
-impl Faces for MisfitFinder {
-    fn vertices(&self) -> u64 {
-        self.vertices
-    }
-
-    fn vertex(&mut self, _: [f64; 3]) -> Result<(), Halt> {
-        self.vertices += 1;
-        Ok(())
-    }
-
-    fn misfit(&mut self, place: Place, found: f64) -> Result<(), Halt> {
-        if self.vertices == self.vertex {
-            return Err(Fault::new(place, COORDINATE, found.to_string()).into());
-        }
-        Ok(())
-    }
-
-    fn face(&mut self, _: &[u32]) -> Result<(), Halt> {
-        Ok(())
+        self.sink.face(&self.corners)
     }
 }

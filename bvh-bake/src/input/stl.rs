@@ -101,7 +101,7 @@ fn read_binary<R: Read>(reader: &mut ByteReader<R>, solids: &mut impl Solids) ->
         if let Some(place) = misfit {
             let (corner, value) = first_misfit(&triangles[place]).unwrap_or_default();
             let byte = at(place) + 12 + 4 * corner as u64;
-            return Err(Fault::new(Place::Byte(byte), COORDINATE, value.to_string()).into());
+            return Err(Fault::new(Place::Byte(byte), COORDINATE, format!("{value:e}")).into());
         }
         if triangles.len() < now {
             let place = Place::Byte(at(triangles.len()));
@@ -184,7 +184,7 @@ fn read_facet<R: Read>(words: &mut Words<R>) -> Result<[[f64; 3]; 3], Fault> {
         for coordinate in coordinates {
             *coordinate = words.number()?;
             if !coordinate_fits(*coordinate) {
-                return Err(Fault::new(words.place(), COORDINATE, coordinate.to_string()));
+                return Err(Fault::new(words.place(), COORDINATE, format!("{coordinate:e}")));
             }
         }
     }

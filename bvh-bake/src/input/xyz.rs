@@ -49,9 +49,12 @@ fn read_points<R: Read>(words: &mut Words<R>, faces: &mut IndexedFaces) -> Resul
 /// Adds a point that was read at a place.
 pub(super) fn add(faces: &mut IndexedFaces, point: [f64; 3], place: Place) -> Result<(), Halt> {
     if let Some(misfit) = point.into_iter().find(|&coordinate| !coordinate_fits(coordinate)) {
-        return Err(
-            Fault::new(place, COORDINATE, format!("{misfit}; leave out points without a position")).into()
-        );
+        return Err(Fault::new(
+            place,
+            COORDINATE,
+            format!("{misfit:e}; leave out points without a position"),
+        )
+        .into());
     }
     let number = faces.vertex_count();
     if number == MAX_TRIANGLES {

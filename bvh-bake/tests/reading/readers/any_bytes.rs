@@ -162,10 +162,11 @@ proptest! {
 
     #[test]
     fn mutated_files_never_panic(
-        seed in 0usize..8,
+        seed in any::<prop::sample::Index>(),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
     ) {
-        let (format, mut bytes) = seeds().swap_remove(seed);
+        let mut seeds = seeds();
+        let (format, mut bytes) = seeds.swap_remove(seed.index(seeds.len()));
         for (at, value, kind) in edits {
             if bytes.is_empty() {
                 break;
@@ -183,10 +184,12 @@ proptest! {
 
     #[test]
     fn digits_changed_in_a_document_never_panic(
-        seed in 6usize..8,
+        seed in any::<prop::sample::Index>(),
         edits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 1..5),
     ) {
-        let (format, mut bytes) = seeds().swap_remove(seed);
+        let mut documents = seeds();
+        documents.retain(|(format, _)| matches!(format, MeshFormat::Gltf | MeshFormat::Pcd));
+        let (format, mut bytes) = documents.swap_remove(seed.index(documents.len()));
         let digits: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at].is_ascii_digit()).collect();
         for (at, digit) in edits {
             bytes[digits[at.index(digits.len())]] = digit;
