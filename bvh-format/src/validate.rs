@@ -80,7 +80,7 @@ pub fn validate(bytes: &[u8]) -> Result<Layout, FormatError> {
 /// [`crate::bounds::check_bounds`].
 ///
 /// The check takes two passes over all bytes, and one over the pages for their links, with one more page read per link.
-/// It needs twice the memory of the object table and of the instances, 48 bytes per object for the topology, and some
+/// It needs three times the memory of the object table and of the instances, 48 bytes per object for the topology, and some
 /// 300 KiB for counts. Each worker also holds a page with its blocks. These take at most 1 MiB, and 64 KiB in files of
 /// `bvh-bake`.
 ///
