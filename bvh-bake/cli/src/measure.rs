@@ -1,4 +1,7 @@
-//! The origin of a report: the program, the date, and what the system reports about the machine.
+//! The common part of `cbvh report` and the laboratory of this project: the origin of a report, which is the program, the
+//! date, and what the system reports about the machine.
+//!
+//! This library is not meant for applications, and nothing in it is stable.
 
 use bvh_format::header::{MAJOR, MINOR, version_name};
 use serde::Serialize;
@@ -83,7 +86,7 @@ impl Machine {
 
 /// Returns the date `days` days after 1970-01-01. The Gregorian calendar repeats every 400 years, or 146097 days, and a year
 /// that begins in March ends with its leap day.
-fn date(days: u64) -> String {
+pub fn date(days: u64) -> String {
     // Days since 0000-03-01.
     let days = days + 719468;
     let (era, day) = (days / 146097, days % 146097);
@@ -109,6 +112,7 @@ mod tests {
             (11016, "2000-02-29"),
             (11017, "2000-03-01"),
             (20453, "2025-12-31"),
+            (47541, "2100-03-01"),
             (20454, "2026-01-01"),
             (146097, "2370-01-01"),
         ] {

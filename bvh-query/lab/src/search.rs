@@ -15,7 +15,7 @@ use bvh_bake::{Effort, Options, to_bytes};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Backend, Bvh, Pose, Querier};
-use cbvh_measure::origin::Origin;
+use cbvh_measure::Origin;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};

@@ -18,8 +18,7 @@ use crate::view::output::{self, name_of};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeReport, Options};
 use bvh_query::{Backend, Bvh, Pose, Querier, QueryError};
-use cbvh_measure::origin::Origin;
-use cbvh_measure::table;
+use cbvh_measure::Origin;
 use cbvh_view::{Named, Page};
 use clap::Args;
 use inputs::{Baked, Pair, bake_both};
@@ -285,9 +284,10 @@ impl Report {
         };
         let columns: Vec<&str> = json.rows.iter().take(1).flat_map(|row| row.names()).collect();
         let panels: Vec<&[Panel]> = sections.iter().map(|section| &section.panels[..]).collect();
+        let as_text = serde_json::to_string_pretty(&json);
         for (name, text) in [
             ("report.csv", csv(&columns, json.rows.iter().copied())),
-            ("report.json", table::json(&json).map_err(|error| Failure::System(error.to_string()))?),
+            ("report.json", as_text.map_err(|error| Failure::System(error.to_string()))? + "\n"),
             ("report.svg", plot::svg(&panels)),
             ("report.html", page::page(self, words)),
         ] {
@@ -324,7 +324,7 @@ mod tests {
             csv(&row.names().collect::<Vec<_>>(), [&row]),
             "name,none,of,is,count\n\"a, \"\"b\"\"\",,0.1,1,\n"
         );
-        let json: Value = serde_json::from_str(&table::json(&row).unwrap()).unwrap();
+        let json: Value = serde_json::to_value(&row).unwrap();
         assert_eq!(json, json!({ "name": "a, \"b\"", "none": null, "of": 0.1, "is": true, "count": null }));
         assert_eq!((row.number("of"), row.number("is"), row.number("none")), (Some(0.1), Some(1.0), None));
     }

@@ -2,11 +2,12 @@
 
 use crate::common::place;
 use serde_json::{Value, json};
+use std::fmt::Display;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Command, Stdio};
 
 /// Sends each line only when the line before has been answered, as the suite does.
-fn talk(lines: &[Value]) -> Vec<Value> {
+fn talk(lines: &[impl Display]) -> Vec<Value> {
     let mut child = Command::new(env!("CARGO_BIN_EXE_cbvh"))
         .arg("suite")
         .env_remove("CBVH_ISA")
@@ -96,6 +97,9 @@ fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
     let asked = |id: u32, ask: &str, b: &str, pose: Value| json!({"id": id, "ask": ask, "a": "large", "b": b, "pose": pose});
     let refused = [
         json!({"mesh": "broken", "vertices": [["nan", 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
+        json!({"mesh": "broken", "vertices": [["-inf", 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
+        // 1e9 and 0.1 have no common grid of single precision.
+        json!({"mesh": "broken", "vertices": [[0.1, 0, 0], [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [[0, 0, 0]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [], "triangles": []}),
         asked(1, "collide", "broken", at(0.0, 0.0, 0.0)),
@@ -106,6 +110,13 @@ fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
         asked(6, "within", "large", at(0.0, 0.0, 0.0)),
         json!({"id": 7, "ask": "side", "a": "large", "point": ["nan", 0, 0]}),
         json!({"id": 8, "ask": "ray", "a": "large", "origin": [0, 0, 0], "direction": [0, 0, 0]}),
+        json!({"id": 9, "ask": "side", "a": "large", "point": "here"}),
+        json!({"id": 10}),
+        json!({"hello": 2}),
+        json!({"mesh": "broken"}),
+        json!({"mesh": 3}),
+        json!({}),
+        json!([]),
         json!("hello"),
     ];
     let mut lines = vec![corner("large", 4.0)];
@@ -120,6 +131,13 @@ fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
             assert_eq!(answer["refused"], json!(true), "{line}");
             assert!(!answer["reason"].as_str().unwrap().is_empty() && answer["id"] == line["id"], "{line}");
         }
+    }
+}
+
+#[test]
+fn a_line_that_is_no_json_is_refused() {
+    for answer in talk(&["", "{", "hello"]) {
+        assert_eq!(answer["refused"], json!(true), "{answer}");
     }
 }
 
