@@ -350,13 +350,7 @@ impl Scene {
                 scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, path))
             });
             let found = found.map_err(|(number, source)| {
-                let Encounter { a, b, .. } = encounters[number];
-                match scene.instances_at(a, b) {
-                    Some((one, other)) => {
-                        scene.pair_error(ScenePair { a: one.id(a), b: other.id(b) }, source)
-                    }
-                    None => source.into(),
-                }
+                scene.error_of(encounters[number].a, encounters[number].b, source)
             })?;
             Ok(adopt(found))
         });

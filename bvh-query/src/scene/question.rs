@@ -89,13 +89,7 @@ struct InstancePair<'a> {
 }
 
 impl InstancePair<'_> {
-    fn collide(&mut self, querier: &mut Querier) -> Result<bool, QueryError> {
-        match &mut self.tracker {
-            Some(tracker) => tracker.collide(querier, self.a, self.b, &self.pose),
-            None => querier.collide(self.a, self.b, &self.pose),
-        }
-    }
-
+    /// Returns whether the pair is at most `d` apart; with 0, whether it touches.
     fn within(&mut self, querier: &mut Querier, d: f64) -> Result<bool, QueryError> {
         match &mut self.tracker {
             Some(tracker) => tracker.within(querier, self.a, self.b, &self.pose, d),
@@ -103,9 +97,6 @@ impl InstancePair<'_> {
         }
     }
 }
-
-/// A question about a pair with yes or no for an answer.
-type YesOrNo<'a> = &'a (dyn Fn(&mut Querier, &mut InstancePair<'_>) -> Result<bool, QueryError> + Sync);
 
 /// Takes some near pairs of a scene, and breaks where no more are wanted.
 type VisitPairs<'a> = &'a mut dyn FnMut(&mut Scene, Vec<NearPair>) -> Result<ControlFlow<()>, SceneError>;
@@ -130,7 +121,7 @@ impl Scene {
     /// [`SceneError::Pair`] with a pair whose question has no answer, because a page is damaged or the budget does not
     /// suffice, unless another pair is found to touch.
     pub fn collide(&mut self) -> Result<bool, SceneError> {
-        self.any(0.0, &|querier, pair| pair.collide(querier))
+        self.any(0.0)
     }
 
     /// Returns whether any pair is at most `d` apart, in mesh units.
@@ -139,7 +130,7 @@ impl Scene {
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::collide`].
     pub fn within(&mut self, d: f64) -> Result<bool, SceneError> {
         check_distance(d)?;
-        self.any(d, &|querier, pair| pair.within(querier, d))
+        self.any(d)
     }
 
     /// Returns all pairs that touch.
@@ -147,7 +138,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Pair`] with the first pair whose question has no answer.
     pub fn pairs_in_contact(&mut self) -> Result<Vec<ScenePair>, SceneError> {
-        self.all(0.0, &|querier, pair| pair.collide(querier))
+        self.pairs_within(0.0)
     }
 
     /// Returns all pairs that are at most `d` apart, in mesh units.
@@ -156,7 +147,7 @@ impl Scene {
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::pairs_in_contact`].
     pub fn pairs_within(&mut self, d: f64) -> Result<Vec<ScenePair>, SceneError> {
         check_distance(d)?;
-        self.all(d, &|querier, pair| pair.within(querier, d))
+        self.each_near(d, true, |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))
     }
 
     /// Returns all pairs that touch, or of which one is inside the other, wholly or in part, with their relations.
@@ -166,7 +157,7 @@ impl Scene {
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
     pub fn relations(&mut self) -> Result<Vec<(ScenePair, Relation)>, SceneError> {
-        self.each_near(0.0, |querier, pair| {
+        self.each_near(0.0, false, |querier, pair| {
             let relation = querier.relation(pair.a, pair.b, &pair.pose)?;
             Ok((relation != Relation::Apart).then_some((pair.ids, relation)))
         })
@@ -194,7 +185,7 @@ impl Scene {
         options.check()?;
         let mut all = Vec::new();
         self.each_piece(options.clearance, &mut |scene, mut near_pairs| {
-            near_pairs.retain(|near_pair| scene.ids(near_pair).is_some_and(&is_asked));
+            near_pairs.retain(|near_pair| scene.ids(near_pair.a, near_pair.b).is_some_and(&is_asked));
             all.extend(scene.each(&near_pairs, |querier, pair| {
                 let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
                 Ok((clash.class != ClashClass::Apart).then_some(SceneClash { pair: pair.ids, clash }))
@@ -209,7 +200,7 @@ impl Scene {
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`].
     pub fn contacts(&mut self) -> Result<Vec<SceneContact>, SceneError> {
-        let of_pairs = self.each_near(0.0, |querier, pair| {
+        let of_pairs = self.each_near(0.0, false, |querier, pair| {
             let contacts = querier.contacts(pair.a, pair.b, &pair.pose)?;
             Ok((!contacts.is_empty()).then_some((pair.ids, contacts)))
         })?;
@@ -350,22 +341,22 @@ impl Scene {
         Ok(())
     }
 
-    /// Asks the pairs at most `limit` apart until one says yes.
-    fn any(&mut self, limit: f64, ask: YesOrNo<'_>) -> Result<bool, SceneError> {
+    /// Returns whether any pair is at most `d` apart.
+    fn any(&mut self, d: f64) -> Result<bool, SceneError> {
         self.start();
-        let squared_limit = (limit + self.contents.reach_of_pairs()).powi(2);
+        let squared_limit = (d + self.contents.reach_of_pairs()).powi(2);
         let likely = self.likely_pair().filter(|likely| likely.squared_gap <= squared_limit);
         if let Some(likely) = likely
-            && self.any_of(&[likely], ask)?
+            && self.any_of(&[likely], d)?
         {
             return Ok(true);
         }
         let (mut next, mut first_error) = (Next::All, None);
-        while let Some(mut near_pairs) = self.next_piece(&mut next, limit)? {
+        while let Some(mut near_pairs) = self.next_piece(&mut next, d)? {
             near_pairs.retain(|near_pair| likely.is_none_or(|likely| !near_pair.is_of(&likely)));
             // The nearest boxes are the likeliest.
             nearest_first(&mut near_pairs);
-            match self.any_of(&near_pairs, ask) {
+            match self.any_of(&near_pairs, d) {
                 Ok(false) => {}
                 Ok(true) => return Ok(true),
                 // Where no visits are left, none of the other pairs has an answer.
@@ -376,16 +367,16 @@ impl Scene {
         first_error.map_or(Ok(false), Err)
     }
 
-    /// Asks near pairs until one says yes. Where one says yes, an error about another does not matter.
-    fn any_of(&mut self, near_pairs: &[NearPair], ask: YesOrNo<'_>) -> Result<bool, SceneError> {
-        // By a pair that says yes, or because no visits are left.
+    /// Asks near pairs until one is at most `d` apart. Where one is, an error about another does not matter.
+    fn any_of(&mut self, near_pairs: &[NearPair], d: f64) -> Result<bool, SceneError> {
+        // By a pair that is, or because no visits are left.
         let is_decided = AtomicBool::new(false);
         self.remember(near_pairs);
         let answers = self.each(near_pairs, |querier, pair| {
             if is_decided.load(Ordering::Relaxed) {
                 return Ok(None);
             }
-            let answer = ask(querier, pair);
+            let answer = pair.within(querier, d);
             if matches!(answer, Ok(true) | Err(QueryError::Budget { .. })) {
                 is_decided.store(true, Ordering::Relaxed);
             }
@@ -401,25 +392,19 @@ impl Scene {
         }
     }
 
-    /// Asks all pairs at most `limit` apart.
-    fn all(&mut self, limit: f64, ask: YesOrNo<'_>) -> Result<Vec<ScenePair>, SceneError> {
-        let mut all = Vec::new();
-        self.each_piece(limit, &mut |scene, near_pairs| {
-            scene.remember(&near_pairs);
-            all.extend(scene.each(&near_pairs, |querier, pair| Ok(ask(querier, pair)?.then_some(pair.ids)))?);
-            Ok(ControlFlow::Continue(()))
-        })?;
-        Ok(all)
-    }
-
-    /// Starts a question, and asks about all pairs at most `limit` apart, in ascending order.
+    /// Starts a question, and asks about all pairs at most `limit` apart, in ascending order. `remembers` tells that trackers
+    /// help with the question.
     fn each_near<R: Send>(
         &mut self,
         limit: f64,
+        remembers: bool,
         ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<Option<R>, QueryError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
         let mut all = Vec::new();
         self.each_piece(limit, &mut |scene, near_pairs| {
+            if remembers {
+                scene.remember(&near_pairs);
+            }
             all.extend(scene.each(&near_pairs, &ask)?);
             Ok(ControlFlow::Continue(()))
         })?;
@@ -525,10 +510,7 @@ impl Scene {
             Ok(answer)
         });
         (self.stats, self.pairs_asked) = (stats, asked.into_inner());
-        found.map_err(|(number, source)| match self.ids(&near_pairs[number]) {
-            Some(pair) => self.pair_error(pair, source),
-            None => source.into(),
-        })
+        found.map_err(|(number, source)| self.error_of(near_pairs[number].a, near_pairs[number].b, source))
     }
 
     /// Asks about a near pair, and counts its questions. It calls `ask` through a pointer, so that it is compiled once, and not
@@ -540,15 +522,15 @@ impl Scene {
         asked: &AtomicU64,
         ask: &mut dyn FnMut(&mut Querier, &mut InstancePair<'_>) -> Result<(), QueryError>,
     ) -> Result<(), QueryError> {
-        let (Some((a, b)), Some(ids)) = (self.both(near_pair), self.ids(near_pair)) else {
+        let &NearPair { a, b, .. } = near_pair;
+        let (Some((one, other)), Some(ids)) = (self.instances_at(a, b), self.ids(a, b)) else {
             return Ok(());
         };
-        let pose = Pose::relative_of_instances(&a.world, &b.world);
+        let pose = Pose::relative_of_instances(&one.world, &other.world);
         let before = querier.questions();
-        let margins = (a.margin + self.contents.margin_of_pair(near_pair.a, near_pair.b), b.margin);
-        let (a, b) = (a.shape.held_open()?, b.shape.held_open()?);
-        let tracker = self.trackers.get((near_pair.a, near_pair.b));
-        let (a, b) = (a.shape().with_margin(margins.0), b.shape().with_margin(margins.1));
+        let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
+        let (tracker, margin) = (self.trackers.get((a, b)), one.margin + self.contents.margin_of_pair(a, b));
+        let (a, b) = (shape_a.shape().with_margin(margin), shape_b.shape().with_margin(other.margin));
         let pair = &mut InstancePair { ids, a, b, pose, tracker };
         let answer = self.workers.ask_rest(querier, |querier| ask(querier, pair));
         asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
@@ -560,15 +542,18 @@ impl Scene {
         SceneError::Pair { a: self.contents.label(pair.a), b: self.contents.label(pair.b), source }
     }
 
-    /// Returns both instances of a candidate.
-    fn both(&self, near_pair: &NearPair) -> Option<(&Instance, &Instance)> {
-        self.instances_at(near_pair.a, near_pair.b)
+    /// Names the instances in two places, whose question has no answer.
+    pub(super) fn error_of(&self, a: u32, b: u32, source: QueryError) -> SceneError {
+        match self.ids(a, b) {
+            Some(pair) => self.pair_error(pair, source),
+            None => source.into(),
+        }
     }
 
-    /// Returns the identifiers of a candidate.
-    fn ids(&self, near_pair: &NearPair) -> Option<ScenePair> {
-        let (a, b) = self.both(near_pair)?;
-        Some(ScenePair { a: a.id(near_pair.a), b: b.id(near_pair.b) })
+    /// Returns the identifiers of the instances in two places.
+    pub(super) fn ids(&self, a: u32, b: u32) -> Option<ScenePair> {
+        let (one, other) = self.instances_at(a, b)?;
+        Some(ScenePair { a: one.id(a), b: other.id(b) })
     }
 
     /// Returns the instances in two places.
