@@ -139,6 +139,62 @@ pub(crate) unsafe fn hand_out<T: Clone, H: Plain + From<u64>>(
     })
 }
 
+/// Defines functions about what a handle stands for: `see` looks it up, and within an expression it has the name of the handle.
+/// Each entry has a kind, a name, its own arguments, the place of what it finds, unless that is a text, and an expression. `one`
+/// writes a value, `list` a list, and `text` a text; `change` makes a change, and drops what the expression returns.
+macro_rules! about {
+    ($handle:ident: $type:ty, $see:path;
+        $($kind:ident $name:ident($($own:tt)*) $(-> $to:ident: $row:ty)? = $found:expr;)*
+    ) => { $(
+        crate::entry::about_one! { $kind $name ($handle: $type, $see) ($($own)*) ($($to: $row)?) $found }
+    )* };
+}
+macro_rules! about_one {
+    (one $name:ident ($handle:ident: $type:ty, $see:path) ($($own:tt)*) ($to:ident: $row:ty) $found:expr) => {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name($handle: $type, $($own)* $to: *mut $row) -> i32 {
+            // SAFETY: the header asks for it.
+            $see($handle, |$handle| unsafe { crate::entry::write(stringify!($to), $to, || Ok($found)) })
+        }
+    };
+    (list $name:ident ($handle:ident: $type:ty, $see:path) ($($own:tt)*) ($to:ident: $row:ty) $found:expr) => {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            $handle: $type,
+            $($own)*
+            $to: *mut $row,
+            capacity: usize,
+            count: *mut usize,
+        ) -> i32 {
+            // SAFETY: the header asks for it.
+            $see($handle, |$handle| unsafe {
+                let mut list = crate::output::List::new(stringify!($to), $to, capacity, count)?;
+                list.add($found);
+                list.finish()
+            })
+        }
+    };
+    (text $name:ident ($handle:ident: $type:ty, $see:path) ($($own:tt)*) () $found:expr) => {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            $handle: $type,
+            $($own)*
+            buffer: *mut std::ffi::c_char,
+            capacity: usize,
+            length: *mut usize,
+        ) -> i32 {
+            // SAFETY: the header asks for it.
+            $see($handle, |$handle| unsafe { crate::output::text($found, buffer, capacity, length) })
+        }
+    };
+    (change $name:ident ($handle:ident: $type:ty, $see:path) ($($own:tt)*) () $found:expr) => {
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $name($handle: $type, $($own)*) -> i32 {
+            $see($handle, |$handle| Ok($found))
+        }
+    };
+}
+
 /// Defines a family of functions. First come the arguments that all of them start with, and the question that is made of
 /// these: it has a method `each`. Each entry then defines a function: its name, its own arguments, the type of its answers,
 /// and what it passes to `each` after the pointer to the answers.
@@ -156,7 +212,7 @@ macro_rules! question {
         }
     };
 }
-pub(crate) use {question, questions};
+pub(crate) use {about, about_one, question, questions};
 
 #[cfg(test)]
 mod tests {

@@ -1,9 +1,9 @@
 //! Meshes: opened files, whole or object by object, with a radius or solid.
 
 use crate::at_hand::MESHES;
-use crate::entry::{caller_floats, entry, hand_out, write};
+use crate::entry::{about, caller_floats, entry, hand_out};
 use crate::input::{self, array, text};
-use crate::output::{self, List, One};
+use crate::output::{self, One};
 use crate::status::{Failure, Status};
 use crate::types::{MAP, MAP_SPARSE, MAP_WHOLE, MeshHandle, READ};
 use bvh_query::{Bvh, OwnedShape, ReadAhead};
@@ -181,16 +181,18 @@ pub unsafe extern "C" fn cbvh_mesh_solid(mesh: MeshHandle, solid: *mut MeshHandl
     unsafe { hand_out(("solid", solid), &MESHES, made) }
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_radius(mesh: MeshHandle, radius: *mut f64) -> i32 {
-    // SAFETY: the header asks for it.
-    ask(mesh, |shape| unsafe { write("radius", radius, || Ok(shape.shape().radius())) })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_is_solid(mesh: MeshHandle, is_solid: *mut bool) -> i32 {
-    // SAFETY: the header asks for it.
-    ask(mesh, |shape| unsafe { write("is_solid", is_solid, || Ok(shape.shape().is_solid())) })
+about! {
+    mesh: MeshHandle, ask;
+    one cbvh_mesh_radius() -> radius: f64 = mesh.shape().radius();
+    one cbvh_mesh_is_solid() -> is_solid: bool = mesh.shape().is_solid();
+    one cbvh_mesh_object_count() -> count: usize = mesh.bvh().objects().len();
+    one cbvh_mesh_triangle_count() -> count: u64 = mesh.shape().triangles();
+    text cbvh_mesh_object_name(number: usize,) = {
+        let objects = mesh.bvh().objects();
+        objects.get(number).ok_or_else(|| no_object(objects.len(), number))?.name()
+    };
+    list cbvh_mesh_duplicates(triangle: u32,) -> triangles: u32 = mesh.bvh().duplicates_of(triangle)?;
+    change cbvh_mesh_validate() = mesh.bvh().validate()?;
 }
 
 #[unsafe(no_mangle)]
@@ -203,50 +205,6 @@ pub unsafe extern "C" fn cbvh_mesh_find(mesh: MeshHandle, name: *const c_char, n
             Failure::new(Status::NotFound, format!("name: expected the name of an object, found {name:?}"))
         })?);
         Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_object_count(mesh: MeshHandle, count: *mut usize) -> i32 {
-    // SAFETY: the header asks for it.
-    ask(mesh, |shape| unsafe { write("count", count, || Ok(shape.bvh().objects().len())) })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_object_name(
-    mesh: MeshHandle,
-    number: usize,
-    buffer: *mut c_char,
-    capacity: usize,
-    length: *mut usize,
-) -> i32 {
-    ask(mesh, |shape| {
-        let objects = shape.bvh().objects();
-        let object = objects.get(number).ok_or_else(|| no_object(objects.len(), number))?;
-        // SAFETY: the header asks for it.
-        unsafe { output::text(object.name(), buffer, capacity, length) }
-    })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_triangle_count(mesh: MeshHandle, count: *mut u64) -> i32 {
-    // SAFETY: the header asks for it.
-    ask(mesh, |shape| unsafe { write("count", count, || Ok(shape.shape().triangles())) })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_mesh_duplicates(
-    mesh: MeshHandle,
-    triangle: u32,
-    triangles: *mut u32,
-    capacity: usize,
-    count: *mut usize,
-) -> i32 {
-    ask(mesh, |shape| {
-        // SAFETY: the header asks for it.
-        let mut list = unsafe { List::new("triangles", triangles, capacity, count) }?;
-        list.add(shape.bvh().duplicates_of(triangle)?);
-        list.finish()
     })
 }
 
@@ -268,9 +226,4 @@ pub unsafe extern "C" fn cbvh_mesh_save(mesh: MeshHandle, path: *const c_char) -
         let file = unsafe { input::path("path", path) }?;
         Ok(bvh_bake::write_atomically(&file, &shape.bytes())?)
     })
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_mesh_validate(mesh: MeshHandle) -> i32 {
-    ask(mesh, |shape| Ok(shape.bvh().validate()?))
 }

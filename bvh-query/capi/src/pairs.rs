@@ -7,7 +7,7 @@ use crate::output::{Lists, Room};
 use crate::poses;
 use crate::queriers::{self, Asker};
 use crate::status::Failure;
-use crate::types::{ContactRow, DistanceChoices, DistanceRow, MeshHandle, PoseRows, QuerierHandle, relation};
+use crate::types::{ContactRow, DistanceChoices, DistanceRow, MeshHandle, PoseRows, QuerierHandle};
 use bvh_query::{Batch, Pose, Querier, QueryError, Shape, displacement};
 use std::ops::ControlFlow;
 
@@ -94,7 +94,7 @@ questions! {
     cbvh_within(d: f64,) -> bool:
         |batch, poses| batch.within(poses, d), |querier, [a, b], pose| querier.within(a, b, pose, d), bool::from;
     cbvh_relations() -> i32:
-        |batch, poses| batch.relations(poses), |querier, [a, b], pose| querier.relation(a, b, pose), relation;
+        |batch, poses| batch.relations(poses), |querier, [a, b], pose| querier.relation(a, b, pose), |of| of as i32;
 }
 
 #[unsafe(no_mangle)]

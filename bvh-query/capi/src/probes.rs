@@ -8,7 +8,7 @@ use crate::queriers::{self, Asker, Probes};
 use crate::scene;
 use crate::status::Failure;
 use crate::types::{
-    ClosestRow, HitRow, MeshHandle, PoseRows, QuerierHandle, RayRow, SceneHandle, SegmentRow, side,
+    ClosestRow, HitRow, MeshHandle, PoseRows, QuerierHandle, RayRow, SceneHandle, SegmentRow,
 };
 use bvh_query::{PlacedShape, Pose, ProbeBatch, Querier, QueryError, Ray, Scene, SceneError};
 
@@ -158,7 +158,7 @@ probes! {
         |querier, mesh, point| querier.closest_point(mesh, point, within), ClosestRow::from;
     cbvh_sides, cbvh_scene_sides(points: *const f64, count: usize,) -> i32:
         |into| read_points((points, count, f64::INFINITY), into), |of, points| of.sides(points),
-        |querier, mesh, point| querier.side(mesh, point), side;
+        |querier, mesh, point| querier.side(mesh, point), |of| of as i32;
     cbvh_signed_distances, cbvh_scene_signed_distances(points: *const f64, count: usize, within: f64,) -> ClosestRow:
         |into| read_points((points, count, within), into), |of, points| of.signed_distances(points, within),
         |querier, mesh, point| querier.signed_distance(mesh, point, within), ClosestRow::from;

@@ -170,19 +170,29 @@ structures! {
     }
 }
 
+/// Defines numbers of the header. Those of answers are the library's own.
 macro_rules! numbers {
-    ($($name:ident = $number:expr),*) => { $(pub const $name: i32 = $number;)* };
+    ($($name:ident = $number:literal $(($answer:expr))?),*) => { $(
+        pub const $name: i32 = $number;
+        $(const _: () = assert!($answer as i32 == $name);)?
+    )* };
 }
 numbers!(MAP = 0, MAP_SPARSE = 1, MAP_WHOLE = 2, READ = 3);
 numbers!(BACKEND_BEST = 0, BACKEND_SCALAR = 1, BACKEND_AVX2 = 2, BACKEND_AVX512 = 3, BACKEND_NEON = 4);
-numbers!(TOUCHING = 0, APART = 1, A_IN_B = 2, B_IN_A = 3, MIXED = 4, RELATION_UNDEFINED = 5);
-numbers!(CLASH_APART = 0, CLASH_NEAR = 1, CLASH_TOUCHING = 2, CLASH_OVERLAPPING = 3, CLASH_CONTAINED = 4);
-numbers!(CLASH_DUPLICATED = 5, CLASH_UNDECIDED = 6, CLASH_INTERSECTING = 7);
-numbers!(REGION_POINT = 0, REGION_SEGMENT = 1, REGION_POLYGON = 2);
-numbers!(SELF_CROSSING = 0, SELF_AT_CORNER = 1, SELF_FOLDED = 2, SELF_DUPLICATE = 3);
+numbers!(TOUCHING = 0(Relation::Touching), APART = 1(Relation::Apart), A_IN_B = 2(Relation::AInB));
+numbers!(B_IN_A = 3(Relation::BInA), MIXED = 4(Relation::Mixed), RELATION_UNDEFINED = 5(Relation::Undefined));
+numbers!(CLASH_APART = 0(ClashClass::Apart), CLASH_NEAR = 1(ClashClass::Near));
+numbers!(CLASH_TOUCHING = 2(ClashClass::Touching), CLASH_OVERLAPPING = 3(ClashClass::Overlapping));
+numbers!(CLASH_CONTAINED = 4(ClashClass::Contained), CLASH_DUPLICATED = 5(ClashClass::Duplicated));
+numbers!(CLASH_UNDECIDED = 6(ClashClass::Undecided), CLASH_INTERSECTING = 7(ClashClass::Intersecting));
+numbers!(REGION_POINT = 0(RegionKind::Point), REGION_SEGMENT = 1(RegionKind::Segment));
+numbers!(REGION_POLYGON = 2(RegionKind::Polygon));
+numbers!(SELF_CROSSING = 0(SelfContactKind::Crossing), SELF_AT_CORNER = 1(SelfContactKind::AtCorner));
+numbers!(SELF_FOLDED = 2(SelfContactKind::Folded), SELF_DUPLICATE = 3(SelfContactKind::Duplicate));
 numbers!(BASE_FIXED = 0, BASE_PLANAR = 1, BASE_FLOATING = 2);
 numbers!(FREE = 0, HIT = 1, NEAR = 2);
-numbers!(OUTSIDE = -1, ON = 0, INSIDE = 1, SIDE_UNDEFINED = 2, SIDE_NOT_ASKED = 3);
+numbers!(OUTSIDE = -1(Side::Outside), ON = 0(Side::On), INSIDE = 1(Side::Inside));
+numbers!(SIDE_UNDEFINED = 2(Side::Undefined), SIDE_NOT_ASKED = 3);
 
 /// Reads `cbvh_backend`.
 pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
@@ -195,26 +205,6 @@ pub(crate) fn backend(name: &str, number: i32) -> Result<Backend, Failure> {
         _ => return Err(Failure::argument(name, "a number of cbvh_backend, 0 to 4", number)),
     };
     Ok(Backend::from_name(backend.name())?)
-}
-
-pub(crate) fn relation(of: Relation) -> i32 {
-    match of {
-        Relation::Touching => TOUCHING,
-        Relation::Apart => APART,
-        Relation::AInB => A_IN_B,
-        Relation::BInA => B_IN_A,
-        Relation::Mixed => MIXED,
-        Relation::Undefined => RELATION_UNDEFINED,
-    }
-}
-
-pub(crate) fn side(of: Side) -> i32 {
-    match of {
-        Side::Outside => OUTSIDE,
-        Side::On => ON,
-        Side::Inside => INSIDE,
-        Side::Undefined => SIDE_UNDEFINED,
-    }
 }
 
 impl From<&Pose> for PoseRows {
@@ -315,79 +305,32 @@ impl Body {
 
 /// Makes a row of an answer: its fields, and some that have other values.
 macro_rules! row {
-    ($answer:ident { $($field:ident),* } => $row:ident { $($other:ident: $value:expr),* }) => {
+    ($of:ident: $answer:ident { $($field:ident),* } => $row:ident { $($other:ident: $value:expr),* }) => {
         impl From<$answer> for $row {
-            fn from(of: $answer) -> Self {
-                Self { $($other: $value,)* $($field: of.$field.into()),* }
+            fn from($of: $answer) -> Self {
+                Self { $($other: $value,)* $($field: $of.$field.into()),* }
             }
         }
     };
 }
-row!(ScenePair { a, b } => PairRow {});
-row!(Contact { object_a, triangle_a, object_b, triangle_b } => ContactRow {});
-row!(SceneContact { pair, contact } => SceneContactRow {});
-row!(SceneClash { pair, clash } => SceneClashRow {});
-row!(SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
-row!(Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
+row!(of: ScenePair { a, b } => PairRow {});
+row!(of: Contact { object_a, triangle_a, object_b, triangle_b } => ContactRow {});
+row!(of: SceneContact { pair, contact } => SceneContactRow {});
+row!(of: SceneClash { pair, clash } => SceneClashRow {});
+row!(of: SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
+row!(of: Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
     => DistanceRow {});
-row!(Separation { lower, upper, translation } => SeparationRow {});
-row!(Penetration { lower, upper, translation, point, radii, is_spent } => PenetrationRow { reserved: 0 });
-row!(Patch { first, count, center, normal, length, area, depth } => PatchRow {});
-row!(ClosestPoint { distance, lower, upper, point, object, triangle }
+row!(of: Separation { lower, upper, translation } => SeparationRow {});
+row!(of: Penetration { lower, upper, translation, point, radii, is_spent } => PenetrationRow { reserved: 0 });
+row!(of: Patch { first, count, center, normal, length, area, depth } => PatchRow {});
+row!(of: ClosestPoint { distance, lower, upper, point, object, triangle }
     => ClosestRow { instance: Instance::NONE, found: 1, side: SIDE_NOT_ASKED });
-row!(RayHit { t, lower, upper, point, object, triangle }
+row!(of: RayHit { t, lower, upper, point, object, triangle }
     => HitRow { instance: Instance::NONE, found: 1, reserved: 0 });
-
-impl From<Clash> for ClashRow {
-    fn from(of: Clash) -> Self {
-        let kind = match of.class {
-            ClashClass::Apart => CLASH_APART,
-            ClashClass::Near => CLASH_NEAR,
-            ClashClass::Touching => CLASH_TOUCHING,
-            ClashClass::Overlapping => CLASH_OVERLAPPING,
-            ClashClass::Contained => CLASH_CONTAINED,
-            ClashClass::Duplicated => CLASH_DUPLICATED,
-            ClashClass::Undecided => CLASH_UNDECIDED,
-            ClashClass::Intersecting => CLASH_INTERSECTING,
-        };
-        let Clash { distance, point, .. } = of;
-        Self { kind, relation: relation(of.relation), distance, point, depth: of.depth.into() }
-    }
-}
-
-impl From<ContactRegion> for RegionRow {
-    fn from(of: ContactRegion) -> Self {
-        let kind = match of.kind {
-            RegionKind::Point => REGION_POINT,
-            RegionKind::Segment => REGION_SEGMENT,
-            RegionKind::Polygon => REGION_POLYGON,
-        };
-        let ContactRegion { contact, count, all_points: points, normal_a, normal_b, error, overlap, .. } = of;
-        Self {
-            contact: contact.into(),
-            kind,
-            count: count.into(),
-            points,
-            normal_a,
-            normal_b,
-            error,
-            overlap,
-        }
-    }
-}
-
-impl From<SelfContact> for SelfContactRow {
-    fn from(of: SelfContact) -> Self {
-        let kind = match of.kind {
-            SelfContactKind::Crossing => SELF_CROSSING,
-            SelfContactKind::AtCorner => SELF_AT_CORNER,
-            SelfContactKind::Folded => SELF_FOLDED,
-            SelfContactKind::Duplicate => SELF_DUPLICATE,
-        };
-        let SelfContact { object_a, triangle_a, object_b, triangle_b, .. } = of;
-        Self { object_a, triangle_a, object_b, triangle_b, kind }
-    }
-}
+row!(of: Clash { distance, point, depth } => ClashRow { kind: of.class as i32, relation: of.relation as i32 });
+row!(of: ContactRegion { contact, count, normal_a, normal_b, error, overlap }
+    => RegionRow { kind: of.kind as i32, points: of.all_points });
+row!(of: SelfContact { object_a, triangle_a, object_b, triangle_b } => SelfContactRow { kind: of.kind as i32 });
 
 /// Makes a row of what may be no answer.
 macro_rules! found {
@@ -404,7 +347,7 @@ found!(ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
 
 impl From<SignedDistance> for ClosestRow {
     fn from(of: SignedDistance) -> Self {
-        Self { side: side(of.side), ..of.closest.into() }
+        Self { side: of.side as i32, ..of.closest.into() }
     }
 }
 
@@ -428,7 +371,7 @@ impl From<SceneRayHit> for HitRow {
 
 impl From<(ScenePair, Relation)> for SceneRelationRow {
     fn from((pair, of): (ScenePair, Relation)) -> Self {
-        Self { pair: pair.into(), relation: relation(of), reserved: 0 }
+        Self { pair: pair.into(), relation: of as i32, reserved: 0 }
     }
 }
 

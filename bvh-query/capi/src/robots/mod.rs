@@ -6,10 +6,10 @@ mod questions;
 
 use crate::at_hand::MESHES;
 use crate::cores;
-use crate::entry::{entry, hand_out, write};
+use crate::entry::{about, entry, hand_out};
 use crate::input::{self, flag, optional, path, pointers, reserve, text};
 use crate::mesh::check_regular;
-use crate::output::{self, List, One};
+use crate::output::{List, One};
 use crate::poses;
 use crate::shared::{Shared, Snapshot};
 use crate::status::{Failure, Status};
@@ -112,126 +112,52 @@ pub extern "C" fn cbvh_robot_set_parallel(robot: RobotHandle, parallel: i32) -> 
     entry(|| ROBOTS.share("robot", robot.id)?.set_parallel("robot", parallel))
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_robot_count(robot: RobotHandle, counts: *mut RobotCounts) -> i32 {
-    see(robot, |robot| {
-        let (joints, links) = (robot.joints().len(), robot.links().count());
-        let (groups, states) = (robot.groups().len(), robot.states().len());
-        // SAFETY: the header asks for it.
-        unsafe { write("counts", counts, || Ok(RobotCounts { joints, links, groups, states })) }
-    })
-}
-
 /// Fails for want of something with a number.
 fn none_of(what: &str, number: u64) -> Failure {
     Failure::new(Status::NotFound, format!("expected a {what} of the robot, found the number {number}"))
 }
 
-/// Functions that write the name of something with a number.
-macro_rules! names {
-    ($($name:ident: $what:literal, $found:expr;)*) => { $(
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
-            robot: RobotHandle,
-            number: usize,
-            buffer: *mut c_char,
-            capacity: usize,
-            length: *mut usize,
-        ) -> i32 {
-            see(robot, |robot| {
-                let found: fn(&Robot, usize) -> Option<&String> = $found;
-                let name = found(robot, number).ok_or_else(|| none_of($what, number as u64))?;
-                // SAFETY: the header asks for it.
-                unsafe { output::text(name, buffer, capacity, length) }
-            })
-        }
-    )* };
-}
-names! {
-    cbvh_robot_joint_name: "joint value", |robot, number| robot.joints().get(number);
-    cbvh_robot_group_name: "group", |robot, number| Some(&robot.groups().get(number)?.name);
-    cbvh_robot_state_name: "state", |robot, number| Some(&robot.states().get(number)?.name);
-    cbvh_robot_state_group: "state", |robot, number| Some(&robot.states().get(number)?.group);
+/// Returns something that has a number.
+fn found<'a, T>(what: &str, number: usize, found: Option<&'a T>) -> Result<&'a T, Failure> {
+    found.ok_or_else(|| none_of(what, number as u64))
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_robot_name(
-    robot: RobotHandle,
-    buffer: *mut c_char,
-    capacity: usize,
-    length: *mut usize,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    see(robot, |robot| unsafe { output::text(robot.name(), buffer, capacity, length) })
-}
-
-/// Functions that list what a robot has.
-macro_rules! lists {
-    ($($name:ident ($($own:tt)*) -> $rows:ident: $row:ty, $found:expr;)*) => { $(
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
-            robot: RobotHandle,
-            $($own)*
-            $rows: *mut $row,
-            capacity: usize,
-            count: *mut usize,
-        ) -> i32 {
-            see(robot, |robot| {
-                // SAFETY: the header asks for it.
-                let mut list = unsafe { List::new(stringify!($rows), $rows, capacity, count) }?;
-                let found: Result<Vec<$row>, Failure> = $found(robot);
-                list.add(found?);
-                list.finish()
-            })
-        }
-    )* };
-}
-lists! {
-    cbvh_robot_limits() -> limits: LimitsRow, |robot: &mut Robot| {
-        Ok(robot.limits().iter().map(|&[lower, upper]| LimitsRow { lower, upper }).collect())
+about! {
+    robot: RobotHandle, see;
+    one cbvh_robot_count() -> counts: RobotCounts = RobotCounts {
+        joints: robot.joints().len(),
+        links: robot.links().count(),
+        groups: robot.groups().len(),
+        states: robot.states().len(),
     };
-    cbvh_robot_links() -> links: Body, |robot: &mut Robot| Ok((0..robot.links().count()).map(Body::of).collect());
-    cbvh_robot_group_joints(number: usize,) -> joints: usize, |robot: &mut Robot| {
-        let group = robot.groups().get(number).ok_or_else(|| none_of("group", number as u64))?;
-        Ok(group.joints.clone())
+    text cbvh_robot_name() = robot.name();
+    text cbvh_robot_joint_name(number: usize,) =
+        found("joint value", number, robot.joints().get(number))?;
+    text cbvh_robot_group_name(number: usize,) = &found("group", number, robot.groups().get(number))?.name;
+    text cbvh_robot_state_name(number: usize,) = &found("state", number, robot.states().get(number))?.name;
+    text cbvh_robot_state_group(number: usize,) = &found("state", number, robot.states().get(number))?.group;
+    text cbvh_robot_body_name(body: Body,) =
+        robot.body_name(body.number()).ok_or_else(|| none_of("body", body.id))?;
+    list cbvh_robot_limits() -> limits: LimitsRow =
+        robot.limits().iter().map(|&[lower, upper]| LimitsRow { lower, upper });
+    list cbvh_robot_links() -> links: Body = (0..robot.links().count()).map(Body::of);
+    list cbvh_robot_group_joints(number: usize,) -> joints: usize =
+        found("group", number, robot.groups().get(number))?.joints.iter().copied();
+    list cbvh_robot_state_values(number: usize,) -> values: JointValueRow = {
+        let values = &found("state", number, robot.states().get(number))?.values;
+        values.iter().map(|&(joint, value)| JointValueRow { joint, value })
     };
-    cbvh_robot_state_values(number: usize,) -> values: JointValueRow, |robot: &mut Robot| {
-        let state = robot.states().get(number).ok_or_else(|| none_of("state", number as u64))?;
-        Ok(state.values.iter().map(|&(joint, value)| JointValueRow { joint, value }).collect())
-    };
-    cbvh_robot_pairs() -> pairs: BodyPairRow, |robot: &mut Robot| {
+    list cbvh_robot_pairs() -> pairs: BodyPairRow = {
         let pairs = robot.pairs();
-        Ok(pairs.iter().map(|pair| numbered(robot, pair)).collect())
+        pairs.iter().map(|pair| numbered(robot, pair)).collect::<Vec<_>>()
     };
+    one cbvh_robot_find(name: *const c_char,) -> body: Body = Body::of(robot.body(text("name", name)?)?);
 }
 
 /// Returns the numbers of two bodies.
 fn numbered(robot: &Robot, names: &[String; 2]) -> BodyPairRow {
     let [a, b] = [0, 1].map(|k| robot.body(&names[k]).map_or(Body { id: 0 }, Body::of));
     BodyPairRow { a, b }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_robot_find(robot: RobotHandle, name: *const c_char, body: *mut Body) -> i32 {
-    see(robot, |robot| {
-        // SAFETY: the header asks for it.
-        unsafe { write("body", body, || Ok(Body::of(robot.body(text("name", name)?)?))) }
-    })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_robot_body_name(
-    robot: RobotHandle,
-    body: Body,
-    buffer: *mut c_char,
-    capacity: usize,
-    length: *mut usize,
-) -> i32 {
-    see(robot, |robot| {
-        let name = robot.body_name(body.number()).ok_or_else(|| none_of("body", body.id))?;
-        // SAFETY: the header asks for it.
-        unsafe { output::text(name, buffer, capacity, length) }
-    })
 }
 
 #[unsafe(no_mangle)]

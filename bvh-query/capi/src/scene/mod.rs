@@ -5,10 +5,10 @@
 mod questions;
 
 use crate::at_hand::MESHES;
-use crate::entry::{entry, hand_out, write};
+use crate::entry::{about, entry, hand_out, write};
 use crate::input::{self, array, flag, optional, text};
 use crate::mesh::check_regular;
-use crate::output::{self, List, One};
+use crate::output::One;
 use crate::poses;
 use crate::shared::{Shared, Snapshot};
 use crate::status::{Failure, Status};
@@ -113,20 +113,29 @@ pub extern "C" fn cbvh_scene_set_parallel(scene: SceneHandle, parallel: i32) -> 
     entry(|| SCENES.share("scene", scene.id)?.set_parallel("scene", parallel))
 }
 
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_set_tracking(scene: SceneHandle, tracking: i32) -> i32 {
-    see(scene, |scene| {
-        scene.set_tracking(flag("tracking", tracking)?);
-        Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_set_budget(scene: SceneHandle, visits: u64) -> i32 {
-    see(scene, |scene| {
-        scene.set_budget(visits);
-        Ok(())
-    })
+about! {
+    scene: SceneHandle, see;
+    change cbvh_scene_set_tracking(tracking: i32,) = scene.set_tracking(flag("tracking", tracking)?);
+    change cbvh_scene_set_budget(visits: u64,) = scene.set_budget(visits);
+    change cbvh_scene_remove(instance: Instance,) = {
+        let held = held(scene, instance)?;
+        scene.remove(instance.into())?;
+        held
+    };
+    change cbvh_scene_attach(child: Instance, parent: Instance,) = scene.attach(child.into(), parent.into())?;
+    change cbvh_scene_detach(child: Instance,) = scene.detach(child.into())?;
+    change cbvh_scene_set_groups(instance: Instance, member: u32, meets: u32,) =
+        scene.set_groups(instance.into(), Groups { member, meets })?;
+    change cbvh_scene_set_allowed(a: Instance, b: Instance, allowed: i32,) =
+        scene.set_allowed(a.into(), b.into(), flag("allowed", allowed)?)?;
+    change cbvh_scene_set_margin(instance: Instance, margin: f64,) = scene.set_margin(instance.into(), margin)?;
+    change cbvh_scene_set_pair_margin(a: Instance, b: Instance, margin: f64,) =
+        scene.set_pair_margin(a.into(), b.into(), margin)?;
+    list cbvh_scene_instances() -> instances: Instance = scene.instances();
+    text cbvh_scene_instance_name(instance: Instance,) = scene.name(instance.into())?.unwrap_or_default();
+    one cbvh_scene_instance_pose(instance: Instance,) -> world: PoseRows = scene.pose(instance.into())?.into();
+    one cbvh_scene_instance_margin(instance: Instance,) -> margin: f64 = scene.margin(instance.into())?;
+    one cbvh_scene_pair_margin(a: Instance, b: Instance,) -> margin: f64 = scene.pair_margin(a.into(), b.into())?;
 }
 
 #[unsafe(no_mangle)]
@@ -159,15 +168,6 @@ pub unsafe extern "C" fn cbvh_scene_add(
     })
 }
 
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_remove(scene: SceneHandle, instance: Instance) -> i32 {
-    see(scene, |scene| {
-        let held = held(scene, instance)?;
-        scene.remove(instance.into())?;
-        Ok(held)
-    })
-}
-
 /// Returns what an instance holds, to be let go without the lock.
 fn held(scene: &Scene, instance: Instance) -> Result<SceneShape, Failure> {
     Ok(scene.shape(instance.into())?.clone())
@@ -186,16 +186,6 @@ pub extern "C" fn cbvh_scene_set_mesh(scene: SceneHandle, instance: Instance, me
         drop(held);
         Ok(())
     })
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_attach(scene: SceneHandle, child: Instance, parent: Instance) -> i32 {
-    see(scene, |scene| Ok(scene.attach(child.into(), parent.into())?))
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_detach(scene: SceneHandle, child: Instance) -> i32 {
-    see(scene, |scene| Ok(scene.detach(child.into())?))
 }
 
 #[unsafe(no_mangle)]
@@ -237,36 +227,6 @@ pub unsafe extern "C" fn cbvh_scene_set_poses(
 }
 
 #[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_set_groups(
-    scene: SceneHandle,
-    instance: Instance,
-    member: u32,
-    meets: u32,
-) -> i32 {
-    see(scene, |scene| Ok(scene.set_groups(instance.into(), Groups { member, meets })?))
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_set_allowed(scene: SceneHandle, a: Instance, b: Instance, allowed: i32) -> i32 {
-    see(scene, |scene| Ok(scene.set_allowed(a.into(), b.into(), flag("allowed", allowed)?)?))
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_set_margin(scene: SceneHandle, instance: Instance, margin: f64) -> i32 {
-    see(scene, |scene| Ok(scene.set_margin(instance.into(), margin)?))
-}
-
-#[unsafe(no_mangle)]
-pub extern "C" fn cbvh_scene_set_pair_margin(
-    scene: SceneHandle,
-    a: Instance,
-    b: Instance,
-    margin: f64,
-) -> i32 {
-    see(scene, |scene| Ok(scene.set_pair_margin(a.into(), b.into(), margin)?))
-}
-
-#[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_find(
     scene: SceneHandle,
     name: *const c_char,
@@ -284,46 +244,6 @@ pub unsafe extern "C" fn cbvh_scene_find(
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_instances(
-    scene: SceneHandle,
-    instances: *mut Instance,
-    capacity: usize,
-    count: *mut usize,
-) -> i32 {
-    see(scene, |scene| {
-        // SAFETY: the header asks for it.
-        let mut list = unsafe { List::new("instances", instances, capacity, count) }?;
-        list.add(scene.instances());
-        list.finish()
-    })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_instance_name(
-    scene: SceneHandle,
-    instance: Instance,
-    buffer: *mut c_char,
-    capacity: usize,
-    length: *mut usize,
-) -> i32 {
-    see(scene, |scene| {
-        let name = scene.name(instance.into())?.unwrap_or_default();
-        // SAFETY: the header asks for it.
-        unsafe { output::text(name, buffer, capacity, length) }
-    })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_instance_pose(
-    scene: SceneHandle,
-    instance: Instance,
-    world: *mut PoseRows,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    see(scene, |scene| unsafe { write("world", world, || Ok(scene.pose(instance.into())?.into())) })
-}
-
-#[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_scene_instance_mesh(
     scene: SceneHandle,
     instance: Instance,
@@ -332,27 +252,6 @@ pub unsafe extern "C" fn cbvh_scene_instance_mesh(
     let found = || Ok(with(scene, |scene| held(scene, instance))?.opened()?);
     // SAFETY: the header asks for it.
     unsafe { hand_out(("mesh", mesh), &MESHES, found) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_instance_margin(
-    scene: SceneHandle,
-    instance: Instance,
-    margin: *mut f64,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    see(scene, |scene| unsafe { write("margin", margin, || Ok(scene.margin(instance.into())?)) })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_pair_margin(
-    scene: SceneHandle,
-    a: Instance,
-    b: Instance,
-    margin: *mut f64,
-) -> i32 {
-    // SAFETY: the header asks for it.
-    see(scene, |scene| unsafe { write("margin", margin, || Ok(scene.pair_margin(a.into(), b.into())?)) })
 }
 
 #[unsafe(no_mangle)]

@@ -1,9 +1,9 @@
 //! Questions about all pairs of a scene, in poses and on ways.
 
 use super::ask as ask_scene;
-use crate::entry::write;
+use crate::entry::about;
 use crate::input::{self, array, reserve};
-use crate::output::{List, One};
+use crate::output::One;
 use crate::paths::AskedPath;
 use crate::status::Failure;
 use crate::types::{
@@ -12,77 +12,17 @@ use crate::types::{
 };
 use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 
-/// Asks a question with one answer.
-///
-/// # Safety
-/// As for `One::new`.
-unsafe fn one<T: Into<R>, R: Copy>(
-    scene: SceneHandle,
-    answer: *mut R,
-    ask: impl FnOnce(&mut Scene) -> Result<T, SceneError>,
-) -> i32 {
-    // SAFETY: the caller vouches for it.
-    ask_scene(scene, |scene| unsafe { write("answer", answer, || Ok(ask(scene)?.into())) })
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_collide(scene: SceneHandle, answer: *mut bool) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { one(scene, answer, Scene::collide) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_within(scene: SceneHandle, d: f64, answer: *mut bool) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { one(scene, answer, |scene| scene.within(d)) }
-}
-
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn cbvh_scene_distance(scene: SceneHandle, answer: *mut SceneDistanceRow) -> i32 {
-    // SAFETY: the header asks for it.
-    unsafe { one(scene, answer, Scene::distance) }
-}
-
-/// Asks a question with a list of answers.
-///
-/// # Safety
-/// As for `List::new`.
-unsafe fn list<T: Into<R>, R: Copy, E: Into<Failure>>(
-    scene: SceneHandle,
-    (name, rows, capacity, count): (&'static str, *mut R, usize, *mut usize),
-    ask: impl FnOnce(&mut Scene) -> Result<Vec<T>, E>,
-) -> i32 {
-    ask_scene(scene, |scene| {
-        // SAFETY: the caller vouches for it.
-        let mut list = unsafe { List::new(name, rows, capacity, count) }?;
-        list.add(ask(scene).map_err(Into::into)?);
-        list.finish()
-    })
-}
-
-macro_rules! lists {
-    ($($name:ident ($($own:tt)*) -> $rows:ident: $row:ty, $ask:expr;)*) => { $(
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
-            scene: SceneHandle,
-            $($own)*
-            $rows: *mut $row,
-            capacity: usize,
-            count: *mut usize,
-        ) -> i32 {
-            // SAFETY: the header asks for it.
-            unsafe { list(scene, (stringify!($rows), $rows, capacity, count), $ask) }
-        }
-    )* };
-}
-lists! {
-    cbvh_scene_pairs_in_contact() -> pairs: PairRow, Scene::pairs_in_contact;
-    cbvh_scene_pairs_within(d: f64,) -> pairs: PairRow, |scene| scene.pairs_within(d);
-    cbvh_scene_relations() -> relations: SceneRelationRow, Scene::relations;
-    cbvh_scene_contacts() -> contacts: SceneContactRow, Scene::contacts;
-    cbvh_scene_clashes(options: *const ClashChoices,) -> clashes: SceneClashRow, |scene| -> Result<_, Failure> {
-        Ok(scene.clashes(&input::options("options", options)?.read())?)
-    };
+about! {
+    scene: SceneHandle, ask_scene;
+    one cbvh_scene_collide() -> answer: bool = scene.collide()?;
+    one cbvh_scene_within(d: f64,) -> answer: bool = scene.within(d)?;
+    one cbvh_scene_distance() -> answer: SceneDistanceRow = scene.distance()?.into();
+    list cbvh_scene_pairs_in_contact() -> pairs: PairRow = scene.pairs_in_contact()?;
+    list cbvh_scene_pairs_within(d: f64,) -> pairs: PairRow = scene.pairs_within(d)?;
+    list cbvh_scene_relations() -> relations: SceneRelationRow = scene.relations()?;
+    list cbvh_scene_contacts() -> contacts: SceneContactRow = scene.contacts()?;
+    list cbvh_scene_clashes(options: *const ClashChoices,) -> clashes: SceneClashRow =
+        scene.clashes(&input::options("options", options)?.read())?;
 }
 
 /// Refuses an instance that is named twice: only one of its ways would be looked at.
