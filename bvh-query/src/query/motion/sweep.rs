@@ -253,7 +253,7 @@ mod tests {
                 Pose::new(*pose.rotation(), pose.translation().map(|t| t * size)).unwrap()
             };
             let [start, middle, end] = [scaled(random), scaled(random), scaled(random)];
-            let limit = size * [0.1, 1e-3, 1e-6][round % 2];
+            let limit = size * [0.1, 1e-3, 1e-6][round / 8];
             let sweep = Sweep { start, middle, end, limit };
             for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
                 let mut querier = Querier::with_backend(backend);
