@@ -136,7 +136,7 @@ fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
 
 #[test]
 fn a_line_that_is_no_json_is_refused() {
-    for answer in talk(&["", "{", "hello"]) {
+    for answer in talk(&["{", "hello", "\u{0}"]) {
         assert_eq!(answer["refused"], json!(true), "{answer}");
     }
 }
