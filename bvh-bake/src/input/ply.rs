@@ -320,8 +320,9 @@ impl<R: Read> Body<R> {
             return Ok(number as u32);
         }
         let place = if self.format == Format::Ascii { self.place() } else { before };
-        let found = if number.abs() < 1e15 { number.to_string() } else { format!("{number:e}") };
-        Err(Fault::new(place, format!("{what} from 0 to {most}"), found))
+        // With an exponent where there would be many digits.
+        let found = format!("{number:?}");
+        Err(Fault::new(place, format!("{what} from 0 to {most}"), found.trim_end_matches(".0")))
     }
 }
 

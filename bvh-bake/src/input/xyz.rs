@@ -49,12 +49,8 @@ fn read_points<R: Read>(words: &mut Words<R>, faces: &mut IndexedFaces) -> Resul
 /// Adds a point that was read at a place.
 pub(super) fn add(faces: &mut IndexedFaces, point: [f64; 3], place: Place) -> Result<(), Halt> {
     if let Some(misfit) = point.into_iter().find(|&coordinate| !coordinate_fits(coordinate)) {
-        return Err(Fault::new(
-            place,
-            COORDINATE,
-            format!("{misfit:e}; leave out points without a position"),
-        )
-        .into());
+        let found = format!("{misfit:e}; leave out points without a position");
+        return Err(Fault::new(place, COORDINATE, found).into());
     }
     let number = faces.vertex_count();
     if number == MAX_TRIANGLES {

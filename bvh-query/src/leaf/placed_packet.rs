@@ -198,7 +198,7 @@ impl PlacedPackets {
     #[inline(always)]
     pub(crate) fn place(&mut self, page: u32, packet: u16) -> Place<'_> {
         let wanted = self.query << 42 | u64::from(page) << 16 | u64::from(packet);
-        // A page that changed after it was checked may have any number.
+        // A page whose bytes change after their check may have any number.
         let place = (page as usize).wrapping_mul(37).wrapping_add(usize::from(packet)) % PACKETS_PER_SIDE;
         Place { key: &mut self.keys[place], wanted, packet: &mut self.packets[place] }
     }

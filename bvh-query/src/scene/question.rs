@@ -551,7 +551,7 @@ impl Scene {
     }
 
     /// Returns the identifiers of the instances in two places.
-    pub(super) fn ids(&self, a: u32, b: u32) -> Option<ScenePair> {
+    fn ids(&self, a: u32, b: u32) -> Option<ScenePair> {
         let (one, other) = self.instances_at(a, b)?;
         Some(ScenePair { a: one.id(a), b: other.id(b) })
     }

@@ -284,10 +284,11 @@ impl Report {
         };
         let columns: Vec<&str> = json.rows.iter().take(1).flat_map(|row| row.names()).collect();
         let panels: Vec<&[Panel]> = sections.iter().map(|section| &section.panels[..]).collect();
-        let as_text = serde_json::to_string_pretty(&json);
+        let json_text =
+            serde_json::to_string_pretty(&json).map_err(|error| Failure::System(error.to_string()))?;
         for (name, text) in [
             ("report.csv", csv(&columns, json.rows.iter().copied())),
-            ("report.json", as_text.map_err(|error| Failure::System(error.to_string()))? + "\n"),
+            ("report.json", json_text + "\n"),
             ("report.svg", plot::svg(&panels)),
             ("report.html", page::page(self, words)),
         ] {

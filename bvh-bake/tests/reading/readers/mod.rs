@@ -241,6 +241,13 @@ fn ply_counts_are_checked_before_anything_is_read() {
     assert_eq!(try_bytes(whole.as_bytes(), MeshFormat::Ply).unwrap().triangle_count(), 1);
     for (body, expected) in [
         ("0 0 0 1 0 0 0 1 0 3 0 1 3", "line 11: expected a vertex number from 0 to 2, found 3"),
+        ("0 0 0 1 0 0 0 1 0 3 0 1 -1", "line 11: expected a vertex number from 0 to 2, found -1"),
+        ("0 0 0 1 0 0 0 1 0 3 0 1 1e300", "line 11: expected a vertex number from 0 to 2, found 1e300"),
+        ("0 0 0 1 0 0 0 1 0 3 0 1 1e-300", "line 11: expected a vertex number from 0 to 2, found 1e-300"),
+        (
+            "0 0 0 1 0 0 0 1e300 0 3 0 1 2",
+            "line 11: expected a finite coordinate of at most 2^120 in magnitude, found 1e300",
+        ),
         ("0 0 0 1 0 0 0 1 0 3 0 1 0.5", "found 0.5"),
         ("0 0 0 1 0 0 0 1 0 3 0 1 nan", "found NaN"),
         ("0 0 0 1 0 0 0 1 0 2 0 1", "expected a face of at least three vertices, found 2"),
