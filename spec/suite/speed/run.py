@@ -48,7 +48,7 @@ RUNNERS = (
     *((f"FCL {bv}", f"{{bin}}/fcl_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
     ("parry3d", "{bin}/parry-runner", "speed/setup (cargo)"),
     ("CGAL", "{bin}/cgal_native", NATIVE),
-    ("PQP", "{bin}/pqp_native", "PQP=FOLDER speed/setup, if its licence allows you to use it"),
+    ("PQP", "{bin}/pqp_native", "PQP=FOLDER speed/setup, where FOLDER has a built PQP, if its licence allows you to use it"),
     ("Coal, Python", "{python} {suite}/runners/coal_runner.py", "pip install coal"),
     ("FCL, Python", "{python} {suite}/runners/fcl_runner.py", "pip install python-fcl"),
 )

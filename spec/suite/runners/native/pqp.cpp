@@ -1,6 +1,7 @@
 // PQP: triangles in RSS and OBB volumes, with relative and absolute error 0.
 //
-// PQP's licence allows no commercial use, and nobody but its authors passes it on. Who may use it fetches it and names its folder: see README.md.
+// PQP's licence allows no commercial use, and nobody but its authors passes it on. Who may use it builds it by PQP's own instructions and names the
+// folder by PQP=FOLDER; this runner is linked with the library there.
 
 #include "native.hpp"
 
