@@ -48,7 +48,9 @@
  * the status is CBVH_BUFFER_TOO_SMALL. If there is room for none, the buffer may be NULL.
  *
  * Options start with their size in bytes, for example `cbvh_motion_options options = {.size = sizeof options};`, so
- * that later versions can add fields. Fields that are 0 have their defaults. NULL stands for all defaults.
+ * that later versions can add fields at their end. Fields that are 0 have their defaults, and so have fields that the
+ * header of a program does not have yet. A program with a newer header may use an older library as long as fields that
+ * the library does not have are 0; else the status is CBVH_INVALID_ARGUMENT. NULL stands for all defaults.
  *
  * Compatibility: see CBVH_ABI. */
 #ifndef CBVH_H

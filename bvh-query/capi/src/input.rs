@@ -98,27 +98,42 @@ pub(crate) unsafe fn value<T: Plain>(name: &str, pointer: *const T) -> Result<T,
     Ok(unsafe { pointer.read() })
 }
 
-/// Reads options, a structure that starts with its size, so that later versions may have more fields. All fields are 0
-/// where there are no options.
+/// The most bytes that options may have in any version. A size beyond it is a mistake, such as that of options never set.
+const MAX_OPTIONS_BYTES: usize = 4096;
+
+/// Reads options, a structure that starts with its size, so that later versions may have more fields at the end. Fields that
+/// an older program does not have are 0, as all fields are where there are no options. A newer program may set none of the
+/// fields that this version does not have.
 ///
 /// # Safety
 /// The first field of `T` is a `usize`. If the pointer is aligned and not null, as many bytes are there as it says.
 pub(crate) unsafe fn options<T: Plain>(name: &str, pointer: *const T) -> Result<T, Failure> {
+    // SAFETY: any bytes are a value.
+    let mut options = unsafe { std::mem::zeroed::<T>() };
     if pointer.is_null() {
-        // SAFETY: any bytes are a value.
-        return Ok(unsafe { std::mem::zeroed() });
+        return Ok(options);
     }
     check_pointer(name, pointer, 1)?;
     // SAFETY: the first field is a size, which every version of the structure has.
     let found = unsafe { pointer.cast::<usize>().read() };
-    let expected = size_of::<T>();
-    if found != expected {
-        let expected =
-            format!("{expected}, the size of the structure that this version of the library knows");
+    let known = size_of::<T>();
+    // Every version has a field beside its size, and its size is a multiple of the alignment.
+    let least = size_of::<usize>() + align_of::<T>();
+    if !(least..=MAX_OPTIONS_BYTES).contains(&found) || found % align_of::<T>() != 0 {
+        let expected = format!("{known}, the size of the structure, or what it is in another version");
         return Err(Failure::argument(format_args!("{name}.size"), expected, found));
     }
-    // SAFETY: all bytes of the structure are there, and any bytes are a value.
-    Ok(unsafe { pointer.read() })
+    // SAFETY: so many bytes are there, and any bytes are values of `u8`.
+    let given = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>(), found) };
+    let shared = found.min(known);
+    if let Some((byte, value)) = given.iter().enumerate().skip(shared).find(|(_, value)| **value != 0) {
+        let expected =
+            format!("0 in all bytes from {known} on, which only newer versions of the library know");
+        return Err(Failure::argument(name, expected, format_args!("{value} in byte {byte}")));
+    }
+    // SAFETY: both have so many bytes, they do not overlap, and any bytes are a value of `T`.
+    unsafe { ptr::copy_nonoverlapping(given.as_ptr(), ptr::from_mut(&mut options).cast(), shared) };
+    Ok(options)
 }
 
 /// Reads text that ends with a zero byte.

@@ -68,32 +68,39 @@ static size_t any_count(void) {
 
 static int32_t any_flag(void) { return below(4) ? (int32_t)below(2) : (int32_t)random_bits(&source); }
 
-static const void *any_options(void) {
-    static cbvh_bake_options bake;
-    static cbvh_motion_options motion;
-    static cbvh_distance_options distance;
-    static cbvh_clash_options clash;
+/* Options of a bake, whose fields are addresses, too, or others, whose fields are numbers in whatever question they are given. */
+static const void *any_options(bool of_bake) {
+    /* Whichever options it holds, the bytes of every size below its own are there. */
+    static union any {
+        cbvh_bake_options bake;
+        cbvh_motion_options motion;
+        cbvh_distance_options distance;
+        cbvh_clash_options clash;
+        char bytes[200];
+    } kinds[2];
+    union any *const options = &kinds[of_bake];
     const char *const names[] = {NULL, "", "f32", "dop6-u8", "fast", "\xC3(", "packed"};
-    memset(&bake, 0, sizeof bake);
-    bake.size = below(4) ? sizeof bake : below(200);
-    bake.profile = names[below(7)];
-    bake.triangles = names[below(7)];
-    bake.effort = below(2) ? NULL : names[below(7)];
-    bake.max_error = below(2) ? 0 : any_number();
-    bake.no_ids = any_flag();
-    bake.force = below(8) == 0;
-    /* The sizes of larger options would claim bytes that these do not have. */
-    motion = (cbvh_motion_options){below(4) ? sizeof motion : below(sizeof clash), fabs(any_number()),
-        below(2) ? 0 : any_number()};
-    distance = (cbvh_distance_options){below(4) ? sizeof distance : below(sizeof clash), any_number(),
-        below(2) ? 0 : any_number()};
-    clash = (cbvh_clash_options){below(4) ? sizeof clash : below(sizeof clash), fabs(any_number()),
-        below(2) ? 0 : any_number(), below(2) ? 0 : fabs(any_number()), below(2000)};
-    switch (below(5)) {
-    case 0: return &bake;
-    case 1: return &motion;
-    case 2: return &distance;
-    case 3: return &clash;
+    const size_t size = below(4) ? 0 : below(sizeof *options);
+    memset(options, 0, sizeof *options);
+    if (of_bake) {
+        options->bake = (cbvh_bake_options){.size = size ? size : sizeof options->bake, .profile = names[below(7)],
+            .triangles = names[below(7)], .effort = below(2) ? NULL : names[below(7)],
+            .max_error = below(2) ? 0 : any_number(), .no_ids = any_flag(), .force = below(8) == 0};
+        return below(5) ? options : NULL;
+    }
+    switch (below(4)) {
+    case 0:
+        options->motion = (cbvh_motion_options){size ? size : sizeof options->motion, fabs(any_number()),
+            below(2) ? 0 : any_number()};
+        return options;
+    case 1:
+        options->distance = (cbvh_distance_options){size ? size : sizeof options->distance, any_number(),
+            below(2) ? 0 : any_number()};
+        return options;
+    case 2:
+        options->clash = (cbvh_clash_options){size ? size : sizeof options->clash, fabs(any_number()),
+            below(2) ? 0 : any_number(), below(2) ? 0 : fabs(any_number()), below(2000)};
+        return options;
     default: return NULL;
     }
 }
@@ -163,7 +170,7 @@ int main(int argument_count, char **arguments) {
         const cbvh_instance instances[2] = {i, instance};
         void *in = any_input(), *out = any_output();
         void *const more = below(8) ? &input : NULL;
-        const void *const options = any_options();
+        const void *const options = any_options(false), *const baking = any_options(true);
         const size_t n = any_count(), capacity = below(ELEMENTS);
         const double x = any_number(), y = any_number();
         size_t count = 0, counts[ELEMENTS];
@@ -201,8 +208,8 @@ int main(int argument_count, char **arguments) {
         case 27: status = cbvh_mesh_duplicates(a, (uint32_t)below(20), out, capacity, &count); break;
         case 28: status = cbvh_mesh_from_bytes(in, below(sizeof input - 8), (cbvh_mesh *)&made); break;
         case 29: status = cbvh_mesh_validate(a); break;
-        case 30: status = cbvh_bake(in, n, (uint32_t *)more, below(ELEMENTS), options, (cbvh_mesh *)&made); break;
-        case 31: status = cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, below(13), options, (cbvh_mesh *)&made); break;
+        case 30: status = cbvh_bake(in, n, (uint32_t *)more, below(ELEMENTS), baking, (cbvh_mesh *)&made); break;
+        case 31: status = cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, below(13), baking, (cbvh_mesh *)&made); break;
         case 32: status = cbvh_querier_new(any_flag(), (cbvh_querier *)&made); break;
         case 33: status = cbvh_querier_set_parallel(q, any_flag()); break;
         case 34: status = cbvh_querier_stats(q, out); break;
