@@ -1,4 +1,7 @@
-/** Bundles the page into one file: node bundle.js PAGE.html. Says what each part takes, and refuses a page that is too large. */
+/**
+ * Bundles the page into one file: node bundle.js PAGE.html SOURCES. Says what each part takes, and refuses a page that is too
+ * large. The page states SOURCES, the hash of what it is built from.
+ */
 
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import path from "node:path";
@@ -64,6 +67,7 @@ function packed(id, bytes) {
     return `<script type="text/plain" id="${id}">${text}</script>`;
 }
 
+const [to, sources] = process.argv.slice(2);
 const parts = [
     packed("cbvh-main", await bundle("page/main.ts")),
     packed("cbvh-worker", await bundle("worker/worker.ts")),
@@ -72,7 +76,12 @@ const parts = [
 ];
 const style = await transform(await read("page", "style.css"), { loader: "css", minify: true });
 const boot = await transform(await read("page", "boot.js"), { loader: "js", minify: true });
-const fill = { "/*STYLE*/": style.code.trim(), "/*PARTS*/": parts.join("\n"), "/*BOOT*/": boot.code.trim() };
+const fill = {
+    "/*SOURCES*/": sources,
+    "/*STYLE*/": style.code.trim(),
+    "/*PARTS*/": parts.join("\n"),
+    "/*BOOT*/": boot.code.trim(),
+};
 const page = Object.entries(fill).reduce(
     (text, [mark, by]) => text.replace(mark, () => by),
     await read("page", "index.html"),
@@ -84,6 +93,5 @@ console.log(`${"page".padEnd(14)} ${String(page.length).padStart(8)} bytes of at
 if (page.length > MAX_BYTES) {
     throw new Error(`the page: expected at most ${MAX_BYTES} bytes, found ${page.length}`);
 }
-const to = process.argv[2];
 await mkdir(path.dirname(to), { recursive: true });
 await writeFile(to, page);
