@@ -1,6 +1,6 @@
 //! `cbvh validate` and `cbvh verify`: checks a file by itself, and against the mesh from which it was baked.
 
-use crate::console::{self, Failure, Record, counted, hex, length, names, record};
+use crate::console::{self, Failure, Record, counted, hex, length, names, record, shown};
 use crate::options::{size, whole};
 use crate::process;
 use bvh_bake::{FileError, StoredFile, VerifyError, VerifyOptions, validate_in_parallel, verify_files};
@@ -91,7 +91,8 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
         return console::json(&record.with(found.map(|found| record! { self_contacts: found.json() })));
     }
     console::text(&format!(
-        "{file}: valid, format {version}, {}, {}, {}, content {content}\n{}",
+        "{}: valid, format {version}, {}, {}, {}, content {content}\n{}",
+        shown(&file),
         counted(objects, "object"),
         counted(pages, "page"),
         counted(triangles, "triangle"),
@@ -157,8 +158,11 @@ impl SelfContacts {
         let count = counted(self.counts.iter().sum(), "pair");
         let kinds =
             SelfContactKind::ALL.map(|kind| format!("{} {}", self.counts[kind as usize], kind.name()));
-        let mut text =
-            format!("{file}: {count} of triangles meet where they should not: {}\n", kinds.join(", "));
+        let mut text = format!(
+            "{}: {count} of triangles meet where they should not: {}\n",
+            shown(file),
+            kinds.join(", ")
+        );
         for pair in self.first.into_sorted_vec() {
             let SelfContact { object_a, triangle_a, object_b, triangle_b, kind } = pair;
             let name = |object: u32, triangle: u32| match self.has_objects {
@@ -280,8 +284,10 @@ pub(crate) fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
     };
     let how = if report.by_id { "compared by id" } else { "compared in any order" };
     console::text(&format!(
-        "{file}: has the {}{duplicates} of {mesh}, {how}, moved by at most {}; every bound contains its triangles\n",
+        "{}: has the {}{duplicates} of {}, {how}, moved by at most {}; every bound contains its triangles\n",
+        shown(&file),
         counted(report.triangles, "triangle"),
+        shown(&mesh),
         length(report.max_move)
     ))
 }

@@ -145,7 +145,7 @@ impl Failure {
             Self::Limit(text) => (4, text),
             Self::Found(text) => (5, text),
         };
-        Some((code, one_line(&text)))
+        Some((code, shown(&text)))
     }
 }
 
@@ -184,7 +184,7 @@ fn enough(needed: u64) -> String {
 
 /// Writes a line to standard error. A failure to do so has nowhere to be told.
 pub(crate) fn tell_line(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "cbvh: {line}");
+    let _ = writeln!(io::stderr().lock(), "cbvh: {}", shown(line));
 }
 
 /// Writes a JSON object and a line feed to standard error. A failure to do so has nowhere to be told.
@@ -194,13 +194,39 @@ pub(crate) fn tell_json(value: &impl Serialize) {
     }
 }
 
-/// Escapes line breaks and other control characters, which file names may contain.
-fn one_line(text: &str) -> String {
-    let escape = |c: char| if c.is_control() { c.escape_debug().collect() } else { vec![c] };
-    text.chars().flat_map(escape).collect()
+/// Returns text from a file, or the name of one, as a terminal may show it. Control characters, which a terminal obeys and which
+/// begin new lines, are escaped, and so are separators of lines and marks that change the direction of text.
+pub(crate) fn shown(text: &str) -> String {
+    let is_obeyed = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_obeyed(c) {
+            shown.extend(c.escape_debug());
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
 }
 
-/// Prints text as it is.
+/// Returns a path as a word of a command that a person may copy into a shell.
+pub(crate) fn word(path: &Path) -> String {
+    let name = path.display().to_string();
+    // Otherwise it would be an option.
+    let name = if name.starts_with('-') { format!("./{name}") } else { name };
+    let is_plain =
+        |c: char| c.is_alphanumeric() || "_./+-".contains(c) || (cfg!(windows) && "\\:".contains(c));
+    match name.chars().all(is_plain) {
+        true => name,
+        false if cfg!(windows) => format!("\"{name}\""),
+        false => format!("'{}'", name.replace('\'', r"'\''")),
+    }
+}
+
+/// Prints text as it is. Names in it must be [`shown`].
 pub(crate) fn text(text: &str) -> Result<(), Failure> {
     let mut stdout = io::stdout().lock();
     let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
@@ -296,18 +322,30 @@ macro_rules! record {
 pub(crate) use record;
 
 /// Writes rows as comma-separated values (RFC 4180): a line of the names of fields, then one line per row. A figure that was not
-/// taken is absent, never 0 or NaN.
+/// taken is absent, never 0 or NaN. A text that a spreadsheet may take for a formula has an apostrophe before it, and so has one
+/// that begins with an apostrophe, so that a reader gets every text back by removing the apostrophe with which it begins.
 pub(crate) fn csv<'a>(names: &[&'static str], rows: impl IntoIterator<Item = &'a Record>) -> String {
     let line = |fields: Vec<String>| fields.join(",") + "\n";
     let quoted = |field: String| {
         let is_plain = !field.contains([',', '"', '\n', '\r']);
         if is_plain { field } else { format!("\"{}\"", field.replace('"', "\"\"")) }
     };
+    let field = |row: &Record, name: &str| {
+        let text = row.text(name);
+        let is_guarded = row.number(name).is_none() && text.starts_with(may_begin_a_formula);
+        if is_guarded { format!("'{text}") } else { text }
+    };
     let mut text = line(names.iter().map(|&name| name.to_owned()).collect());
     for row in rows {
-        text += &line(names.iter().map(|name| quoted(row.text(name))).collect());
+        text += &line(names.iter().map(|name| quoted(field(row, name))).collect());
     }
     text
+}
+
+/// Returns whether a text with this first character needs an apostrophe: the characters that OWASP lists in "CSV Injection",
+/// with their full-width forms, all control characters, and the apostrophe itself.
+fn may_begin_a_formula(first: char) -> bool {
+    "=+-@\u{ff1d}\u{ff0b}\u{ff0d}\u{ff20}'".contains(first) || first.is_control()
 }
 
 /// Escapes text for an element or an attribute of XML.
@@ -414,6 +452,60 @@ mod tests {
         for (value, expected) in cases {
             assert_eq!(significant(value), expected);
             assert_eq!(expected.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
+        }
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_escaped() {
+        let hostile = "a\u{1b}[31m\r\n\t\0\u{7f}\u{9b}0m\u{202e}b\u{2028}\u{2069}\u{61c}";
+        let expected = "a\\u{1b}[31m\\r\\n\\t\\0\\u{7f}\\u{9b}0m\\u{202e}b\\u{2028}\\u{2069}\\u{61c}";
+        assert_eq!(shown(hostile), expected);
+        let harmless = "C:\\teil 1/\u{fc}ber \"a\" | b\u{301} \u{4e00}\u{1f600} \u{939}\u{93f} \u{200d}";
+        assert_eq!(shown(harmless), harmless);
+    }
+
+    #[test]
+    #[cfg(not(windows))]
+    fn a_path_is_one_word_for_a_shell() {
+        let cases = [
+            ("parts/arm-1.glb", "parts/arm-1.glb"),
+            ("-o", "./-o"),
+            ("--scene x", "'./--scene x'"),
+            ("two words", "'two words'"),
+            ("it's $(date)", r"'it'\''s $(date)'"),
+            ("~", "'~'"),
+        ];
+        for (path, expected) in cases {
+            assert_eq!(word(Path::new(path)), expected);
+        }
+    }
+
+    #[test]
+    fn a_spreadsheet_finds_no_formula() {
+        let cases = [
+            ("arm", "arm"),
+            ("a=1", "a=1"),
+            ("", ""),
+            ("=1+2", "'=1+2"),
+            ("+1", "'+1"),
+            ("-1", "'-1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("\t=1", "'\t=1"),
+            ("\r=1", "\"'\r=1\""),
+            ("\n=1", "\"'\n=1\""),
+            ("\0=1", "'\0=1"),
+            ("\u{ff1d}1", "'\u{ff1d}1"),
+            ("'=1", "''=1"),
+            ("=cmd|' /C calc'!A0,\"", "\"'=cmd|' /C calc'!A0,\"\"\""),
+        ];
+        for (text, expected) in cases {
+            let row = record! { name: text, number: -1.5, count: -2, flag: true, none: None::<f64> };
+            let names: Vec<&str> = row.names().collect();
+            assert_eq!(csv(&names, [&row]), format!("name,number,count,flag,none\n{expected},-1.5,-2,1,\n"));
+            // What a reader has to do.
+            let unquoted = expected.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+            let field = unquoted.map_or(expected.to_owned(), |field| field.replace("\"\"", "\""));
+            assert_eq!(field.strip_prefix('\'').unwrap_or(&field), text);
         }
     }
 

@@ -3,7 +3,7 @@
 mod report;
 mod screen;
 
-use crate::console::{self, Failure, names};
+use crate::console::{self, Failure, names, word};
 use crate::options::{LayoutArguments, Shard, not_negative, positive, size, threads};
 use crate::process;
 use bvh_bake::{BakeError, Effort, FileBake, Options, Outcome};
@@ -62,7 +62,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         return Err(Failure::Usage(what.into()));
     }
     if let Some(folder) = output.filter(|output| output.is_dir() && !are_many(arguments)) {
-        let bake = format!("cbvh bake DIR -o {}", folder.display());
+        let bake = format!("cbvh bake DIR -o {}", word(folder));
         let remedy = format!("name a file in it, or bake a folder of meshes into it: {bake}");
         return Err(Failure::system(folder, format_args!("expected a file, found a folder; {remedy}")));
     }

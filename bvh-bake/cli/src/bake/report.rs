@@ -1,7 +1,7 @@
 //! What a bake prints when it has ended: a summary for people, or one JSON object.
 
 use super::screen::Screen;
-use crate::console::{Record, counted, hex, length, names, record, tell_json};
+use crate::console::{Record, counted, hex, length, names, record, shown, tell_json};
 use crate::process;
 use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, StoredFile, Traffic};
 use bvh_format::Layout;
@@ -111,9 +111,9 @@ impl Report {
     pub(super) fn to_text(&self) -> String {
         let (file, content) = (self.file(), hex(self.file().content_xxh3));
         let Some(baked) = self.baked() else {
-            return format!("{}: up to date, content {content}\n", self.output);
+            return format!("{}: up to date, content {content}\n", shown(&self.output));
         };
-        let mut text = format!("{} -> {}\n", self.input, self.output);
+        let mut text = format!("{} -> {}\n", shown(&self.input), shown(&self.output));
         let mut line = |label: &str, value: String| text.push_str(&format!("  {label:<12} {value}\n"));
         let left_out = match file.duplicates {
             0 => String::new(),

@@ -1,7 +1,7 @@
 //! The clashes that were found: their order, their ids, and their fields and words.
 
 use super::parts::{Assembly, centre};
-use crate::console::{Record, hex, record};
+use crate::console::{Record, hex, record, shown};
 use bvh_format::checksum::checksum;
 use bvh_query::{ClashClass, Relation, SceneClash};
 use std::cmp::Ordering;
@@ -183,7 +183,7 @@ impl<'a> Found<'a> {
 
 /// Returns two names for a person.
 pub(super) fn both(a: &str, b: &str) -> String {
-    format!("{a} | {b}")
+    format!("{} | {}", shown(a), shown(b))
 }
 
 /// Returns a number for a person: six digits.

@@ -8,7 +8,7 @@ mod parts;
 mod zip;
 
 use crate::asking::{self, files::write_file};
-use crate::console::{self, Failure, Record, counted, csv, record, spinner};
+use crate::console::{self, Failure, Record, counted, csv, record, shown, spinner};
 use crate::options::{Shard, not_negative, threads, whole};
 use crate::process;
 use crate::view::output::{self, PageArguments, refuse_input, refuse_standard_output};
@@ -54,7 +54,8 @@ not asked about other parts, because they clash with the earlier one in the same
 --json prints one object: inputs, units, clearance, tolerance, parts, copies (those that are not asked about others), triangles, \
 seconds, classes (the number of clashes of each), and clashes. A clash has id, class, a, b, relation (as cbvh query numbers it), \
 distance, lower and upper (the bounds of the depth), translation (what moves b out of a) and point, both in the world. What \
-there is not is null. --csv writes the same rows. The id is a hash of both names, and stays the same while they do.
+there is not is null. --csv writes the same rows; a name that a spreadsheet could take for a formula, or that begins with an \
+apostrophe, has an apostrophe before it. The id is a hash of both names, and stays the same while they do.
 
 --baseline compares with an earlier --json. Each clash gets a status: new, changed (another class, or a distance or a bound that \
 differs by more than the tolerance) or same; gone has those that are no more. Ask with the same --clearance. --fail-on is then about new and changed ones only.
@@ -321,7 +322,7 @@ impl Answer<'_> {
         let Self { arguments, assembly, tolerance, found, gone, .. } = self;
         let mut text = format!(
             "{}: {}, {}; clearance {}, tolerance {}{}, in {}\n",
-            assembly.name,
+            shown(&assembly.name),
             counted(assembly.parts.len() as u64, "part"),
             counted(assembly.triangles, "triangle"),
             short(arguments.clearance),

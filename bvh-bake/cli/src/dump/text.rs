@@ -1,6 +1,6 @@
 //! Shows a record for a person: one field per line. Objects in a list take one line each if they are flat.
 
-use crate::console::Record;
+use crate::console::{Record, shown};
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::fmt;
@@ -78,10 +78,10 @@ fn add_object(text: &mut String, object: &str, indent: &str) {
     }
 }
 
-/// Shows a value without quotes. Control characters stay escaped, as a terminal would obey them.
+/// Shows a value without quotes. What JSON escapes stays escaped, and so does the rest that a terminal would obey.
 fn plain(value: &str) -> String {
     let text = value.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
-    text.map_or_else(|| value.replace(',', ", "), str::to_owned)
+    shown(&text.map_or_else(|| value.replace(',', ", "), str::to_owned))
 }
 
 #[cfg(test)]
@@ -92,13 +92,13 @@ mod tests {
     #[test]
     fn flat_objects_take_a_line_and_others_a_block() {
         let level = |number: u8| record! { level: number, slabs: [0.5f32, 2.0] };
-        let object = record! { name: "a\u{7}", levels: [level(0), level(1)] };
+        let object = record! { name: "a\u{7}\u{9b}", levels: [level(0), level(1)] };
         let text = of(&record! { file: "f", closed: true, objects: [object] });
         let lines = [
             "file    f",
             "closed  true",
             "objects",
-            "  name  a\\u0007",
+            "  name  a\\u0007\\u{9b}",
             "  levels",
             "    level 0, slabs [0.5, 2.0]",
             "    level 1, slabs [0.5, 2.0]",

@@ -13,7 +13,7 @@ mod timing;
 mod ways;
 
 use crate::asking::{self, files};
-use crate::console::{self, Failure, Record, csv, spinner};
+use crate::console::{self, Failure, Record, csv, shown, spinner};
 use crate::view::output::{self, name_of};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeReport, Options};
@@ -185,7 +185,7 @@ fn run_kind<T: Clone>(
     };
     let spinner = spinner(false);
     for (pair, given, meshes) in inputs {
-        spinner.set_message(pair.name.clone());
+        spinner.set_message(shown(&pair.name));
         let baked = bake_both(&pair, &meshes, &Options::default())?;
         let [(a, _), (b, _)] = &baked;
         let (from, all) = if given.is_empty() {
@@ -302,11 +302,11 @@ impl Report {
         let counted = |count: usize, word| console::counted(count as u64, word);
         let (pairs, rows) = (counted(sections.len(), "pair"), counted(json.rows.len(), "row"));
         let wrong = counted(json.wrong.len(), "wrong answer");
-        let mut text = format!("{}: {pairs}, {rows}, {wrong}\n", out.join("report.html").display());
-        for section in sections {
-            section.sentences.iter().for_each(|line| text += &format!("  {}: {line}\n", section.name));
-        }
-        console::text(&text)?;
+        let summary = format!("{}: {pairs}, {rows}, {wrong}", out.join("report.html").display());
+        let sentences = sections.iter().flat_map(|section| {
+            section.sentences.iter().map(|sentence| format!("  {}: {sentence}", section.name))
+        });
+        console::lines(std::iter::once(summary).chain(sentences).map(|line| shown(&line)))?;
         let Some(first) = json.wrong.first() else { return Ok(()) };
         let what = format!("expected right answers, found {} wrong; the first: {first}", json.wrong.len());
         Err(Failure::invalid(&out.join("report.json"), what))

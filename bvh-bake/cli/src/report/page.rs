@@ -40,7 +40,8 @@ pub(super) fn page(report: &Report, words: &Words) -> String {
     let Words { title, methods, .. } = words;
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\"/>\n<title>cbvh: {title}</title>\n<style>{STYLE}</style>\n\
+         content=\"width=device-width, initial-scale=1\"/>\n<meta http-equiv=\"Content-Security-Policy\" \
+         content=\"default-src 'none'; style-src 'unsafe-inline'\"/>\n<title>cbvh: {title}</title>\n<style>{STYLE}</style>\n\
          </head>\n<body>\n<h1>{title}</h1>\n{}",
         opening(report, words)
     );

@@ -2,7 +2,7 @@
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
 use crate::asking::mesh::{How, LoadedMesh, is_baked, point_out_units, triangles_of};
-use crate::console::Failure;
+use crate::console::{Failure, word};
 use crate::options::LayoutArguments;
 use crate::process::map;
 use bvh_bake::input::{MeshFormat, read_bytes};
@@ -262,10 +262,9 @@ impl LoadedScene {
 pub(crate) fn is_baked_scene(path: &Path) -> Result<bool, Failure> {
     let is_baked = is_baked(path)?;
     if !is_baked && MeshFormat::from_extension(path) == Some(MeshFormat::Gltf) {
-        let name = path.display();
-        return Err(Failure::Invalid(format!(
-            "{name}: expected a scene file, found glTF; bake it first: cbvh bake {name} --scene -o scene.cbvh"
-        )));
+        let remedy = format!("cbvh bake {} --scene -o scene.cbvh", word(path));
+        let what = format_args!("expected a scene file, found glTF; bake it first: {remedy}");
+        return Err(Failure::invalid(path, what));
     }
     Ok(is_baked)
 }

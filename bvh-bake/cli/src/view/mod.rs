@@ -7,7 +7,7 @@ pub(crate) mod output;
 use crate::asking;
 use crate::asking::files;
 use crate::asking::mesh::{self, How, LoadedMesh, is_baked, point_out_units};
-use crate::console::{self, Failure, counted, spinner};
+use crate::console::{self, Failure, counted, shown, spinner};
 use crate::options::{LayoutArguments, not_negative, positive};
 use crate::process;
 use crate::scene::file::{self as scene, Frame, LoadedScene};
@@ -97,7 +97,8 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), Failure> {
     };
     spinner.finish_and_clear();
     let names: Vec<String> = inputs.iter().map(|path| path.display().to_string()).collect();
-    console::text(&format!("{}: shows {}\n", written?.display(), names.join(", ")))
+    let told = shown(&format!("{}: shows {}", written?.display(), names.join(", ")));
+    console::text(&(told + "\n"))
 }
 
 /// Reads what is to be shown.

@@ -129,9 +129,14 @@ pub(crate) fn pose_shown(page: &str) -> String {
     numbers.iter().map(Value::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// Asserts that a page fetches nothing from elsewhere.
+/// Asserts that a page fetches nothing from elsewhere, and that no browser would.
 #[track_caller]
 pub(crate) fn fetches_nothing(page: &[Element]) {
+    let policy = page.iter().find_map(|(_, attributes)| {
+        let is_policy = attributes.get("http-equiv").is_some_and(|what| what == "Content-Security-Policy");
+        attributes.get("content").filter(|_| is_policy)
+    });
+    assert_eq!(policy.map(String::as_str), Some("default-src 'none'; style-src 'unsafe-inline'"));
     let outside = ["src", "xlink:href"];
     for (name, attributes) in page {
         assert!(

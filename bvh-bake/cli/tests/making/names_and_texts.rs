@@ -1,7 +1,7 @@
 //! Checks names of files with spaces and letters of other scripts, and texts as editors on Windows write them.
 
 use crate::common::{Files as _, cbvh_in, cube, gltf, names, place};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs;
 
 const POSE: &str = "1 0 0 5 0 1 0 0 0 0 1 0";
@@ -68,4 +68,69 @@ fn names_may_have_spaces_and_any_letters() {
     let left = ["a.cbvh", "a.gltf", "ein würfel.cbvh", "ein würfel.obj", "i.bin", "zwei.cbvh", "é p.bin"];
     let left: Vec<&str> = left.into_iter().chain(["шаги 1 raw.txt", "шаги 1.txt"]).collect();
     assert_eq!(names(&directory.join(folder)), left);
+}
+
+/// A name that a terminal and a spreadsheet would obey, and that begins a line of its own.
+const HOSTILE: &str = "=a\u{1b}[31m\nno clashes\r\u{7f}\u{9b}2J\u{202e}";
+
+/// Windows has no files of such names.
+#[test]
+#[cfg(unix)]
+fn names_do_not_command_a_terminal() {
+    let directory = &place();
+    let values = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    directory.write("p.bin", values.map(f32::to_le_bytes).concat());
+    directory.write("i.bin", [0u32, 1, 2].map(u32::to_le_bytes).concat());
+    let mut document: Value = serde_json::from_str(&gltf(3, 3, "p.bin", "i.bin")).unwrap();
+    document["meshes"][0]["name"] = json!(HOSTILE);
+    document["nodes"] = json!([
+        { "mesh": 0, "name": HOSTILE },
+        { "mesh": 0, "name": "second", "translation": [0.1, 0.1, 0.0] },
+    ]);
+    let named = |end: &str| format!("{HOSTILE}{end}");
+    let [mesh, scene, objects, missing, page, report] =
+        [".gltf", "-scene.cbvh", "-objects.cbvh", ".obj", ".html", "-report"].map(named);
+    directory.write(&mesh, document.to_string());
+    directory.write("plain.gltf", document.to_string());
+    // Spaces end a name here.
+    directory.write("pairs.txt", "=a\u{1b}[31m\u{9b}2J\u{202e} plain.gltf plain.gltf\n");
+    let runs: &[(i32, &[&str])] = &[
+        (0, &["bake", &mesh, "-o", &scene, "--scene"]),
+        (0, &["bake", &mesh, "-o", &scene, "--scene"]),
+        (0, &["bake", &mesh, "-o", &objects, "--split-objects"]),
+        (0, &["dump", &scene]),
+        (0, &["validate", &objects, "--self-contacts"]),
+        (0, &["verify", &objects, &mesh]),
+        (0, &["query", &objects, &objects, "--mode", "distance", "--pose", POSE]),
+        (0, &["query", &objects, &objects, "--mode", "contacts", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"]),
+        (0, &["scene", &scene, "--mode", "pairs", "--list"]),
+        (0, &["scene", &scene, "--mode", "distance", "--list"]),
+        (0, &["view", &objects, "-o", &page]),
+        (0, &["clash", &mesh, "--csv", "clashes.csv"]),
+        (0, &["clash", &mesh, &scene]),
+        (5, &["clash", &mesh, "--fail-on", "intersecting"]),
+        (0, &["report", "pairs.txt", "--out", &report, "--quick"]),
+        (2, &["bake", &missing, "-o", &objects]),
+        (2, &["dump", &missing]),
+        (3, &["validate", &mesh]),
+        (3, &["scene", &mesh]),
+        (1, &["query", &objects, &objects, "--object", HOSTILE, "--pose", POSE, "--mode", HOSTILE]),
+        (1, &["query", &objects, &objects, "--object", &missing, "--pose", POSE]),
+        (1, &[HOSTILE]),
+    ];
+    for (code, arguments) in runs {
+        let ran = cbvh_in(directory, arguments);
+        assert_eq!(ran.code, *code, "{arguments:?}: {ran:?}");
+        for line in ran.out.lines().chain(ran.err.lines()) {
+            assert!(!line.starts_with("no clashes"), "{arguments:?}: {ran:?}");
+            assert!(!line.contains(|c: char| c.is_control() || c == '\u{202e}'), "{arguments:?}: {ran:?}");
+        }
+    }
+    // The name in the table, quoted because of its line breaks, and what one reads there.
+    let table = directory.text("clashes.csv");
+    assert!(table.contains(&format!(",\"'{HOSTILE}\",second,")), "{table:?}");
+    assert_eq!(table.matches(HOSTILE).count(), 1);
+    // JSON has it as it is.
+    let answer = directory.cbvh("clash plain.gltf --json").done().json();
+    assert_eq!((&answer["clashes"][0]["a"], &answer["clashes"][0]["b"]), (&json!(HOSTILE), &json!("second")));
 }
