@@ -146,6 +146,9 @@ class View(unittest.TestCase):
         ((tag, attributes),) = parser.found
         self.assertEqual((tag, attributes["srcdoc"]), ("iframe", view.html()))
         self.assertIn("300px", attributes["style"])
+        # Scripts of the same origin as the notebook could take the frame's limits away.
+        self.assertEqual(attributes["sandbox"], "allow-scripts allow-downloads")
+        self.assertEqual(sorted(attributes), ["sandbox", "srcdoc", "style"])
         with unittest.mock.patch("cbvh._view.MAX_CELL", 10):
             self.assertIn("save", view._repr_html_())
 

@@ -3,6 +3,7 @@
  * large. The page states SOURCES, the hash of what it is built from.
  */
 
+import { createHash } from "node:crypto";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
@@ -67,20 +68,27 @@ function packed(id, bytes) {
     return `<script type="text/plain" id="${id}">${text}</script>`;
 }
 
+/** What a policy calls the only text that an element may have. */
+const allowed = (text) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
+
 const [to, sources] = process.argv.slice(2);
+const main = await bundle("page/main.ts");
 const parts = [
-    packed("cbvh-main", await bundle("page/main.ts")),
+    packed("cbvh-main", main),
     packed("cbvh-worker", await bundle("worker/worker.ts")),
     packed("cbvh-module", await readFile(inside("dist", "raw", "cbvh_bg.wasm"))),
     packed("cbvh-licences", await licences()),
 ];
-const style = await transform(await read("page", "style.css"), { loader: "css", minify: true });
-const boot = await transform(await read("page", "boot.js"), { loader: "js", minify: true });
+const minified = async (name, loader) =>
+    (await transform(await read("page", name), { loader, minify: true })).code.trim();
+const [style, boot] = [await minified("style.css", "css"), await minified("boot.js", "js")];
 const fill = {
+    "/*ALLOWED-STYLE*/": allowed(style),
+    "/*ALLOWED-CODE*/": `${allowed(boot)} ${allowed(main)}`,
     "/*SOURCES*/": sources,
-    "/*STYLE*/": style.code.trim(),
+    "/*STYLE*/": style,
     "/*PARTS*/": parts.join("\n"),
-    "/*BOOT*/": boot.code.trim(),
+    "/*BOOT*/": boot,
 };
 const page = Object.entries(fill).reduce(
     (text, [mark, by]) => text.replace(mark, () => by),

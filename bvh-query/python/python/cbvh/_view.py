@@ -64,7 +64,8 @@ class View:
         # Within quotes, nothing else has a meaning.
         page = page.replace("&", "&amp;").replace('"', "&quot;")
         style = f"width: 100%; height: {int(self.height)}px; border: 0"
-        return f'<iframe srcdoc="{page}" style="{style}" allowfullscreen></iframe>'
+        # The page runs its own code and saves files, and reaches nothing of the notebook.
+        return f'<iframe srcdoc="{page}" sandbox="allow-scripts allow-downloads" style="{style}"></iframe>'
 
 
 def called(path: str | None) -> tuple[str, str]:

@@ -19,7 +19,7 @@ window.cbvhUnpack = async (id) => {
         code.textContent = new TextDecoder().decode(await window.cbvhUnpack("cbvh-main"));
         document.body.append(code);
     } catch (error) {
-        const message = `This browser cannot unpack the page: ${error.message}. Chrome 91, Firefox 113 and Safari 16.4 can.`;
+        const message = `This browser cannot unpack the page: ${error.message}. Chrome 100, Firefox 113 and Safari 16.4 can.`;
         root.dataset.state = "error";
         root.dataset.message = message;
         document.getElementById("loading").textContent = message;

@@ -13,6 +13,9 @@ export function h<Tag extends keyof HTMLElementTagNameMap>(
     for (const [name, value] of Object.entries(attributes)) {
         if (typeof value === "function") {
             element.addEventListener(name, value);
+        } else if (name === "style") {
+            // The page's policy refuses the attribute, but not what it stands for.
+            element.style.cssText = String(value);
         } else if (value !== undefined && value !== false) {
             element.setAttribute(name, value === true ? "" : String(value));
         }

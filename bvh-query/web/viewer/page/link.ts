@@ -120,14 +120,14 @@ export function commandOf(app: App): string | undefined {
     }
     const [[pathA = "", objectA], [pathB = "", objectB]] = [app.wordsOf(a), b === undefined ? [] : app.wordsOf(b)];
     if (b === undefined) {
-        return `cbvh dump ${quoted(pathA)}`;
+        return `cbvh dump ${fileWord(pathA)}`;
     }
     if (objectA !== undefined && objectB !== undefined && objectA !== objectB) {
         return undefined;
     }
     const object = objectA ?? objectB;
-    const files = `${quoted(pathA)} ${quoted(pathB)}`;
-    const end = object === undefined ? "" : ` --object ${quoted(object)}`;
+    const files = `${fileWord(pathA)} ${fileWord(pathB)}`;
+    const end = object === undefined ? "" : ` --object=${quoted(object)}`;
     const { motion, clearance, tolerance } = app.motion;
     if (panel.current === "motion" && motion !== undefined) {
         const within = clearance > 0 ? ` --clearance ${clearance}` : "";
@@ -139,5 +139,20 @@ export function commandOf(app: App): string | undefined {
     return `cbvh query ${files} --mode ${asks} --pose "${words(app.pair.pose)}"${end}`;
 }
 
-/** A word for a shell. */
-const quoted = (word: string): string => (/^[\w./+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
+/** The path of a file for a shell. One that begins with a dash would be an option. */
+const fileWord = (path: string): string => quoted(path.startsWith("-") ? `./${path}` : path);
+
+/** A word for a shell. A terminal may obey control characters when the word is pasted, even within quotes. */
+function quoted(word: string): string {
+    if (/^[\w./+-]+$/.test(word)) {
+        return word;
+    }
+    if (/[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/u.test(word)) {
+        return `$'${word.replaceAll(/[\\'\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/gu, octal)}'`;
+    }
+    return `'${word.replaceAll("'", "'\\''")}'`;
+}
+
+/** A character as bytes of UTF-8 within the quotes $'...'. */
+const octal = (character: string): string =>
+    Array.from(new TextEncoder().encode(character), (byte) => `\\${byte.toString(8).padStart(3, "0")}`).join("");

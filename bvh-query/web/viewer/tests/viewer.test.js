@@ -5,6 +5,7 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
+import { createHash } from "node:crypto";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import os from "node:os";
 import path from "node:path";
@@ -129,6 +130,50 @@ function part(html, id) {
     const [, text] = new RegExp(`id="${id}">([^<]*)<`).exec(html);
     return gunzipSync(Buffer.from(text, "base64"));
 }
+
+test("the page allows its own code and style, and nothing else", () => {
+    const html = template();
+    const head = html.slice(0, html.indexOf("<style>"));
+    const [, policy] = /<meta http-equiv="Content-Security-Policy" content="([^"]*)">/.exec(head);
+    const allowed = (text) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
+    const [, style] = /<style>(.*?)<\/style>/s.exec(html);
+    const [, boot] = /<script>(.*?)<\/script>/s.exec(html);
+    assert.deepEqual(policy.split("; "), [
+        "default-src 'none'",
+        `script-src 'wasm-unsafe-eval' ${allowed(boot)} ${allowed(part(html, "cbvh-main"))}`,
+        `style-src ${allowed(style)}`,
+        "worker-src blob:",
+        "img-src data:",
+        "base-uri 'none'",
+        "form-action 'none'",
+    ]);
+});
+
+test("what gets into the page neither runs nor reaches the network", async () => {
+    const { page } = await open(template());
+    const refused = await page.evaluate(async () => {
+        const refused = new Set();
+        document.addEventListener("securitypolicyviolation", (event) => refused.add(event.effectiveDirective));
+        const script = document.createElement("script");
+        script.textContent = "window.strange = 1";
+        const button = document.createElement("button");
+        button.setAttribute("onclick", "window.strange = 2");
+        const image = document.createElement("img");
+        image.src = "https://cbvh.invalid/image.png";
+        document.body.append(script, button, image);
+        button.click();
+        await fetch("https://cbvh.invalid/answer").catch(() => {});
+        // The worker has the policy of the page.
+        const code = "fetch('https://cbvh.invalid/').then(() => postMessage(0), () => postMessage(1))";
+        const worker = new Worker(URL.createObjectURL(new Blob([code])));
+        const isRefused = await new Promise((resolve) => {
+            worker.onmessage = ({ data }) => resolve(data);
+        });
+        return [...refused].sort().concat(String(window.strange), String(isRefused));
+    });
+    assert.deepEqual(refused, ["connect-src", "img-src", "script-src-attr", "script-src-elem", "undefined", "1"]);
+    await page.context().close();
+});
 
 test("the committed page is that of these sources", { skip: process.env.CBVH_PAGE === undefined }, () => {
     const committed = readFileSync(path.join(ROOT, "bvh-query/view/page.html"), "utf8");
@@ -513,6 +558,97 @@ test("a link restores the pose and the view, and the command asks the same", { s
     await close();
 });
 
+/** What a shell makes of the words of a line. */
+const shellWords = (line) =>
+    execFileSync("bash", ["-c", `printf '%s\\0' ${line}`], { encoding: "utf8" })
+        .split("\0")
+        .slice(0, -1);
+
+test("the command names each file as a file", { skip: WITHOUT || process.platform === "win32" }, async () => {
+    const { page, errors, close } = await open(pair());
+    const names = [
+        "-o",
+        "--json",
+        "-",
+        "two words",
+        'it\'s "$HOME" `date` \\ *',
+        "$(date).cbvh",
+        "~root",
+        "=ls",
+        "a\nb\u001b[201~\tc\u009b\u202e'\\d",
+        "ü",
+    ];
+    for (const name of names) {
+        const line = await page.evaluate((name) => {
+            const { view } = window.cbvhView;
+            let copied;
+            view.copy = async (text) => {
+                copied = text;
+            };
+            window.cbvhView.wordsOf = () => [name, name];
+            document.querySelector('[aria-label^="Copy the command line"]').click();
+            return copied;
+        }, name);
+        assert.doesNotMatch(line, /[\p{Cc}\p{Cf}]/u);
+        const [program, question, a, b, ...rest] = shellWords(line);
+        const file = name.startsWith("-") ? `./${name}` : name;
+        assert.deepEqual([program, question, a, b, rest.at(-1)], ["cbvh", "query", file, file, `--object=${name}`]);
+    }
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a notebook's frame gives the page what it needs", { skip: WITHOUT }, async () => {
+    const source = readFileSync(path.join(ROOT, "bvh-query/python/python/cbvh/_view.py"), "utf8");
+    const [, attributes] = /<iframe srcdoc="{page}"([^>]*)>/.exec(source);
+    const inner = pair().replaceAll("&", "&amp;").replaceAll('"', "&quot;");
+    const frameWith = attributes.replace("{style}", "width: 1000px; height: 600px");
+    const outer = `<!doctype html><title>notebook</title><textarea></textarea><iframe srcdoc="${inner}"${frameWith}></iframe>`;
+    const context = await browser.newContext({ viewport: { width: 1100, height: 800 }, acceptDownloads: true });
+    const page = await context.newPage();
+    const errors = [];
+    page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
+    page.on("pageerror", (error) => errors.push(String(error)));
+    await page.goto(pathToFileURL(written("notebook.html", outer)).href);
+    const frame = page.frames()[1];
+    await frame.waitForSelector('html[data-state="ready"]', { timeout: 120_000 });
+    assert.ok((await frame.evaluate(() => JSON.parse(document.documentElement.dataset.answer))).distance > 0);
+    const [download] = await Promise.all([
+        page.waitForEvent("download"),
+        frame.click('[aria-label="Save A as .cbvh"]'),
+    ]);
+    assert.equal(download.suggestedFilename(), "ring.cbvh");
+    await frame.click('[aria-label^="Copy the command line"]');
+    await frame.waitForSelector("text=The command was copied.");
+    await page.focus("textarea");
+    await page.keyboard.press("Control+V");
+    assert.match(await page.inputValue("textarea"), /^cbvh query ring\.cbvh box\.cbvh --mode distance/);
+    // The page can neither read nor change the notebook.
+    const reached = await frame.evaluate(() => {
+        const attempts = [
+            () => window.parent.document.title,
+            () => window.parent.location.href,
+            () => window.localStorage.length,
+            () => window.open("about:blank"),
+        ];
+        return attempts.map((attempt) => {
+            try {
+                return attempt();
+            } catch (error) {
+                return error.name;
+            }
+        });
+    });
+    assert.deepEqual(reached, ["SecurityError", "SecurityError", "SecurityError", null]);
+    // A frame without the origin of the notebook may not have the clipboard, and copies another way.
+    const isExpected = (text) => /Blocked opening 'about:blank'|Clipboard API has been blocked/.test(text);
+    assert.deepEqual(
+        errors.filter((text) => !isExpected(text)),
+        [],
+    );
+    await context.close();
+});
+
 test("a scene plays its frames and finds the pairs that touch", { skip: WITHOUT }, async () => {
     const files = [
         ["ring.cbvh", RING()],
@@ -596,7 +732,7 @@ test("pages of the command show objects, scenes and clashes of one file", { skip
             [1, 1],
         ],
     );
-    assert.ok(pair.line.endsWith(" --object far"), pair.line);
+    assert.ok(pair.line.endsWith(" --object=far"), pair.line);
     const asks = pair.line
         .split(" ")
         .slice(1, 4)
