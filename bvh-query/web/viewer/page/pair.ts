@@ -250,7 +250,7 @@ export class Pair {
         }
         const rows: (HTMLElement | false)[] = [fact("patches", countOf(deep.patches))];
         if (typeof depth === "string") {
-            rows.unshift(fact("depth", h("span", { class: "muted" }, depth)));
+            rows.unshift(fact("depth", h("span", { class: "muted" }, this.#whyNoDepth() ?? depth)));
         } else {
             const from = near?.contacts === 0 ? near.distance.pointB : firstOf(deep.centres, depth.point);
             this.#deepOverlay.arrow(from, depth.translation, palette.depth, 0.012);
@@ -273,6 +273,13 @@ export class Pair {
                 "Move B out",
             );
         fill(this.#depth, h("dl", { class: "facts" }, ...rows), out);
+    }
+
+    /** Says which meshes are not closed; `undefined` if another reason than that is in the way. */
+    #whyNoDepth(): string | undefined {
+        const open = [this.a, this.b].filter((body) => body?.shown.summary.closed === false);
+        const names = open.map((body) => body?.name).join(" and ");
+        return open.length > 0 ? `none, because ${names} ${open.length > 1 ? "are" : "is"} not closed` : undefined;
     }
 
     #moveOut(translation: Float64Array): void {

@@ -305,6 +305,28 @@ test("contact shows its depth, and moves B out", { skip: WITHOUT }, async () => 
     await close();
 });
 
+test("meshes that are not closed have no depth, and the page says which", { skip: WITHOUT }, async () => {
+    // The ring without its first triangle.
+    const holed = baked("holed.obj", ring(64, 32).replace(/^f .*\n/m, ""));
+    for (const [files, names] of [
+        [["holed.cbvh", "box.cbvh"], "A is"],
+        [["box.cbvh", "holed.cbvh"], "B is"],
+        [["holed.cbvh", "holed.cbvh"], "A and B are"],
+    ]) {
+        const bytes = { "holed.cbvh": holed, "box.cbvh": BOX() };
+        const show = { kind: "pair", pose: [1, 0, 0, 2.2, 0, 1, 0, 0.1, 0, 0, 1, 0.3] };
+        const { page, errors, close } = await open(
+            filled(
+                files.map((name) => [name, bytes[name]]),
+                show,
+            ),
+        );
+        await page.waitForSelector(`text=none, because ${names} not closed`);
+        assert.deepEqual(errors, []);
+        await close();
+    }
+});
+
 test("a motion has its certain time and its hit, as the command says", { skip: WITHOUT }, async () => {
     const end = [...BESIDE];
     end[3] = -4.5;
