@@ -12,7 +12,8 @@ pub struct Edge {
 
 impl Edge {
     /// Goes straight from one configuration to another, each joint at its constant rate. A floating joint turns about one axis, the
-    /// shorter way.
+    /// shorter way. Other joints turn by the difference of their values, however long that way is: see
+    /// [`Robot::nearest_turns`](crate::Robot::nearest_turns) for the short one.
     ///
     /// # Errors
     /// [`RobotError::Count`] if one has more values than the other.

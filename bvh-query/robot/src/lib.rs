@@ -5,7 +5,7 @@
 //!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
 //!                                                  ├──> questions about configurations (questions, asker)
-//!                                                  └──> motions, certain at every moment (motions, pair_path, edge)
+//!                                                  └──> motions, certain at every moment (motions, pair_path, edge, turns)
 //! ```
 //!
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
@@ -27,6 +27,7 @@ mod shapes;
 mod srdf;
 #[cfg(test)]
 mod testing;
+mod turns;
 mod urdf;
 mod xml;
 

@@ -109,6 +109,22 @@ impl Model {
         }
     }
 
+    /// Returns for each number whether a whole turn more gives the same configuration: it has no limits, and turns each joint that
+    /// it sets by a whole multiple.
+    pub(crate) fn turning(&self) -> Vec<bool> {
+        let mut turning: Vec<bool> =
+            self.limits.iter().map(|limits| limits.iter().all(|limit| limit.is_infinite())).collect();
+        for joint in &self.joints {
+            match joint.kind {
+                Kind::Turn { by, .. } => turning[by.number] &= by.factor.fract() == 0.0,
+                Kind::Slide { by, .. } => turning[by.number] = false,
+                Kind::Planar(first) => turning[first..first + 2].fill(false),
+                Kind::Floating(first) => turning[first..first + 7].fill(false),
+            }
+        }
+        turning
+    }
+
     /// Adds a group, which is moved by a joint from another one.
     pub(crate) fn add_joint(&mut self, name: &str, parent: usize, origin: Frame, kind: Kind) -> usize {
         let child = self.groups.len();

@@ -4,3 +4,4 @@
 mod kinematics;
 mod misuse;
 mod questions;
+mod turns;

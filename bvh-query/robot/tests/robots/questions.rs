@@ -6,7 +6,7 @@ use cbvh_robot::{Base, Edge, Robot, RobotMotion, RobotOptions};
 use cbvh_testkit::Random;
 use std::path::Path;
 
-fn arm(base: Base) -> Robot {
+pub(crate) fn arm(base: Base) -> Robot {
     let mut robot = arm_with_all_pairs(base);
     for (a, b) in [("base", "turret"), ("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "hand")]
     {
@@ -20,17 +20,17 @@ fn arm_with_all_pairs(base: Base) -> Robot {
     Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
 }
 
-fn block(sides: [f64; 3]) -> OwnedShape {
+pub(crate) fn block(sides: [f64; 3]) -> OwnedShape {
     let (bytes, _) = to_bytes(&shapes::block(sides).unwrap(), &Options::default()).unwrap();
     OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).solid().unwrap()
 }
 
-fn at(translation: [f64; 3]) -> Pose {
+pub(crate) fn at(translation: [f64; 3]) -> Pose {
     Pose::new(*Pose::IDENTITY.rotation(), translation).unwrap()
 }
 
 /// The arm among obstacles, with something in its hand.
-fn cell(base: Base) -> Robot {
+pub(crate) fn cell(base: Base) -> Robot {
     let mut robot = arm(base);
     robot.add_obstacle("pillar", block([0.1, 0.1, 1.5]), &at([0.45, 0.0, 0.75])).unwrap();
     robot.add_obstacle("shelf", block([0.4, 1.0, 0.02]), &at([-0.5, 0.0, 0.9])).unwrap();
@@ -38,7 +38,7 @@ fn cell(base: Base) -> Robot {
     robot
 }
 
-fn random_values(random: &mut Random, robot: &Robot) -> Vec<f64> {
+pub(crate) fn random_values(random: &mut Random, robot: &Robot) -> Vec<f64> {
     let value = |[lower, upper]: &[f64; 2]| match lower.is_finite() {
         true => lower + (upper - lower) * random.unit(),
         false => 0.3 * random.signed(),
