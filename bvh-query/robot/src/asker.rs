@@ -126,6 +126,49 @@ impl Asker {
         Ok(touching)
     }
 
+    /// Returns the parts of which one is inside the other without touching it, the inner one first: those that touch as soon as the
+    /// outer one is solid.
+    pub(crate) fn inside(
+        &mut self,
+        setting: &Setting,
+        joints: &[f64],
+    ) -> Result<Vec<[usize; 2]>, RobotError> {
+        self.place(setting, joints)?;
+        let mut found = Vec::new();
+        for (number, pair) in setting.pairs.iter().enumerate() {
+            if self.touches(setting, number)? {
+                continue;
+            }
+            for [inner, outer] in [[pair.b, pair.a], [pair.a, pair.b]] {
+                if self.touches_solid(setting, pair, outer)? {
+                    found.push([inner, outer]);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// Returns whether a pair touches if one of its parts, which is a closed surface, is a solid.
+    fn touches_solid(&mut self, setting: &Setting, pair: &Pair, outer: usize) -> Result<bool, RobotError> {
+        let shape = &setting.parts[outer].shape;
+        if self.gap(pair) > 0.0 || shape.shape().is_solid() {
+            return Ok(false);
+        }
+        let relative = self.relative(setting, pair);
+        let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part]);
+        if boxes_apart(&relative, a, b, self.slack) {
+            return Ok(false);
+        }
+        let failed = |source| failed(setting, pair, source);
+        let solid = match shape.clone().solid() {
+            Err(QueryError::NotClosed(_)) => return Ok(false),
+            solid => solid.map_err(failed)?,
+        };
+        let [a, b] =
+            [pair.a, pair.b].map(|part| if part == outer { &solid } else { &setting.parts[part].shape });
+        self.querier.collide(a, b, &relative.pose()?).map_err(failed)
+    }
+
     /// Returns the nearest pair, its distance, and the nearest points in the world; none if there are no pairs. Of pairs that are
     /// equally near it is the first.
     pub(crate) fn nearest(
@@ -173,7 +216,7 @@ pub(crate) struct Nearest {
 
 /// Names the pair whose question has no answer.
 pub(crate) fn failed(setting: &Setting, pair: &Pair, source: QueryError) -> RobotError {
-    let [a, b] = [pair.a, pair.b].map(|part| setting.name(part).to_owned());
+    let [a, b] = setting.names([pair.a, pair.b]);
     RobotError::Pair { a, b, source }
 }
 

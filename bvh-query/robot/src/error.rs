@@ -109,6 +109,14 @@ pub enum RobotError {
         /// Why there is none.
         source: QueryError,
     },
+    /// A body cannot be a solid.
+    #[error("{body}: {source}")]
+    NotSolid {
+        /// The body.
+        body: String,
+        /// Why not.
+        source: QueryError,
+    },
     /// `CBVH_ISA` names no backend that there is.
     #[error(transparent)]
     Backend(#[from] BackendError),

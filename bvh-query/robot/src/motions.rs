@@ -58,7 +58,8 @@ impl Robot {
     /// given ([`MotionOptions::tolerance`]).
     ///
     /// Each joint moves straight in its value: a continuous joint from 3.0 to -3.0 turns by 6 radians, the long way round. For the
-    /// short way, ask about the goal that [`Robot::nearest_turns`] returns.
+    /// short way, ask about the goal that [`Robot::nearest_turns`] returns. A body that is inside a mesh all the way without touching
+    /// it is free: see [`Robot::pairs_inside`].
     ///
     /// Cost: that of [`Querier::is_free`](bvh_query::Querier::is_free) for each pair that may come near on the way, until one is
     /// not free. It grows with the number of turns, and turns of more than 16,384 radians are refused.
@@ -107,8 +108,8 @@ impl Robot {
         check(&self.setting, edge)
     }
 
-    /// Returns whether a motion is free, and otherwise what touches first, and when. What [`Robot::is_free`] says of the way round holds here
-    /// as well.
+    /// Returns whether a motion is free, and otherwise what touches first, and when. What [`Robot::is_free`] says of the way
+    /// round and of bodies inside others holds here as well.
     ///
     /// Cost: that of [`Robot::is_edge_free`], and of [`Querier::motion`](bvh_query::Querier::motion) for each pair that is not free, up
     /// to the first hit that is known. Links that turn against each other until then, much less than the tolerance apart, take long:

@@ -22,7 +22,8 @@ pub struct RobotDistance {
 }
 
 impl Robot {
-    /// Returns whether any two bodies touch.
+    /// Returns whether any two bodies touch. A body that is inside a mesh without touching it does not: see
+    /// [`Robot::pairs_inside`].
     ///
     /// Cost: the poses of all links, a comparison of balls for each pair, and a question about contact for pairs whose balls
     /// meet, until one touches.
@@ -42,7 +43,24 @@ impl Robot {
     pub fn pairs_in_contact(&mut self, joints: &[f64]) -> Result<Vec<[String; 2]>, RobotError> {
         self.refresh();
         let touching = self.asker.touching(&self.setting, joints)?;
-        Ok(names(&self.setting, &touching))
+        Ok(names(&self.setting, parts_of(&self.setting, touching)))
+    }
+
+    /// Returns the bodies that are inside others without touching them, each with the body around it. [`Robot::collide`] does not
+    /// find them, and a motion within is free, because a mesh is its surface: a room may stand around a robot. If the outer body
+    /// is meant to be full, add its shape as a solid ([`OwnedShape::solid`](bvh_query::OwnedShape::solid)), or call
+    /// [`Robot::make_solid`]; both bodies then touch.
+    ///
+    /// A body counts if a connected part of it is inside a shape of the other one. A shape that is not closed has nothing inside.
+    ///
+    /// Cost: that of [`Robot::pairs_in_contact`], and a question about contact for pairs whose boxes meet.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`]; [`RobotError::Pair`] also if a file in question was baked without topology.
+    pub fn pairs_inside(&mut self, joints: &[f64]) -> Result<Vec<[String; 2]>, RobotError> {
+        self.refresh();
+        let inside = self.asker.inside(&self.setting, joints)?;
+        Ok(names(&self.setting, inside))
     }
 
     /// Returns the nearest two bodies; `None` if there are no pairs.
@@ -80,7 +98,17 @@ impl Robot {
     /// # Errors
     /// The errors of [`Robot::collide_many`].
     pub fn pairs_in_contact_many(&mut self, joints: &[f64]) -> Result<Vec<Vec<[String; 2]>>, RobotError> {
-        self.many(joints, |asker, setting, joints| Ok(names(setting, &asker.touching(setting, joints)?)))
+        self.many(joints, |asker, setting, joints| {
+            Ok(names(setting, parts_of(setting, asker.touching(setting, joints)?)))
+        })
+    }
+
+    /// Returns the bodies that are inside others for each of many configurations, as [`Robot::collide_many`] does.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide_many`] and [`Robot::pairs_inside`].
+    pub fn pairs_inside_many(&mut self, joints: &[f64]) -> Result<Vec<Vec<[String; 2]>>, RobotError> {
+        self.many(joints, |asker, setting, joints| Ok(names(setting, asker.inside(setting, joints)?)))
     }
 
     /// Asks about many configurations.
@@ -158,11 +186,16 @@ impl Robot {
 /// The random configurations that are in memory at a time.
 const SAMPLES_AT_ONCE: usize = 1024;
 
+/// Returns the parts of pairs.
+fn parts_of(setting: &Setting, pairs: Vec<usize>) -> impl Iterator<Item = [usize; 2]> {
+    pairs.into_iter().map(|number| [setting.pairs[number].a, setting.pairs[number].b])
+}
+
 /// Returns the names of the bodies of pairs of parts, each once.
-fn names(setting: &Setting, pairs: &[usize]) -> Vec<[String; 2]> {
+fn names(setting: &Setting, parts: impl IntoIterator<Item = [usize; 2]>) -> Vec<[String; 2]> {
     let mut names: Vec<[String; 2]> = Vec::new();
-    for &number in pairs {
-        let bodies = bodies(setting, number);
+    for parts in parts {
+        let bodies = setting.names(parts);
         if !names.contains(&bodies) {
             names.push(bodies);
         }
@@ -173,7 +206,7 @@ fn names(setting: &Setting, pairs: &[usize]) -> Vec<[String; 2]> {
 /// Returns the names of the bodies of a pair of parts.
 pub(crate) fn bodies(setting: &Setting, pair: usize) -> [String; 2] {
     let pair = &setting.pairs[pair];
-    [pair.a, pair.b].map(|part| setting.name(part).to_owned())
+    setting.names([pair.a, pair.b])
 }
 
 fn of_bodies(setting: &Setting, Nearest { pair, distance, points }: Nearest) -> RobotDistance {

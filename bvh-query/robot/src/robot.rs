@@ -8,7 +8,7 @@ use crate::setting::{Body, Part, Setting};
 use crate::shapes::Shapes;
 use crate::srdf::{self, Group, Semantics, State};
 use crate::urdf;
-use bvh_query::{OwnedShape, Pose};
+use bvh_query::{NumberError, OwnedShape, Pose, QueryError};
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -83,8 +83,9 @@ impl Robot {
         let (model, elements) = urdf::read(path, options)?;
         let semantics =
             options.srdf.as_ref().map_or(Ok(Semantics::default()), |srdf| srdf::read(srdf, &model))?;
-        let body =
-            |link: &crate::model::Link| Some(Body { name: link.name.clone(), is_link: true, link: None });
+        let body = |link: &crate::model::Link| {
+            Some(Body { name: link.name.clone(), is_link: true, link: None, pose: Pose::IDENTITY })
+        };
         let bodies = model.links.iter().map(body).collect();
         let mut shapes = Shapes::new(path, options);
         let mut parts = Vec::new();
@@ -171,6 +172,9 @@ impl Robot {
 
     /// Adds an obstacle: a body that stands in the world.
     ///
+    /// A mesh is its surface, and what is inside does not touch it, so that a room may stand around the robot. If what is
+    /// inside counts, add a solid ([`OwnedShape::solid`]). [`Robot::pairs_inside`] tells which bodies are inside others.
+    ///
     /// # Errors
     /// [`RobotError::Taken`] if a body has the name.
     pub fn add_obstacle(
@@ -183,6 +187,8 @@ impl Robot {
     }
 
     /// Attaches an object to a link, at a pose in the link's frame. It may touch that link and the given ones.
+    ///
+    /// The link's margin does not apply to the object, which has a margin of its own, 0 at first: see [`Robot::set_margin`].
     ///
     /// # Errors
     /// [`RobotError::Taken`] if a body has the name, and [`RobotError::Unknown`] for a link that the robot does not have.
@@ -222,7 +228,7 @@ impl Robot {
             None => (0, pose.into()),
         };
         let part = Part::new(body, (group, link.is_none()), origin, shape, 0.0)?;
-        setting.bodies.push(Some(Body { name, is_link: false, link }));
+        setting.bodies.push(Some(Body { name, is_link: false, link, pose: *pose }));
         setting.parts.push(part);
         self.is_stale = true;
         Ok(body)
@@ -249,7 +255,10 @@ impl Robot {
     pub fn set_pose(&mut self, name: &str, pose: &Pose) -> Result<(), RobotError> {
         let body = self.own_body(name)?;
         let setting = Arc::make_mut(&mut self.setting);
-        let link = setting.bodies[body].as_ref().and_then(|body| body.link);
+        let mut link = None;
+        if let Some(body) = &mut setting.bodies[body] {
+            (link, body.pose) = (body.link, *pose);
+        }
         for part in setting.parts.iter_mut().filter(|part| part.body == body) {
             let origin =
                 link.map_or(Frame::IDENTITY, |link| setting.model.links[link].origin).of(&pose.into());
@@ -261,17 +270,39 @@ impl Robot {
     /// Sets how near others may come to a body, in mesh units. What is nearer than the margins of both counts as contact, and
     /// distances are those of the bodies with their margins.
     ///
+    /// The margin is that of this body alone. What is attached to a link does not get the link's: set the margins of both.
+    ///
     /// # Errors
     /// [`RobotError::Unknown`], and [`RobotError::Query`] if the margin is negative or not finite.
     pub fn set_margin(&mut self, name: &str, margin: f64) -> Result<(), RobotError> {
-        let number = self.body(name)?;
+        // A radius of its own would make up for a negative margin.
+        if !(0.0..f64::INFINITY).contains(&margin) {
+            return Err(QueryError::from(NumberError::Radius(margin)).into());
+        }
+        self.reshape(name, |part| Ok((part.bare.clone(), margin)))
+    }
+
+    /// Makes a body a solid: what is inside touches it from now on.
+    ///
+    /// # Errors
+    /// [`RobotError::Unknown`], and [`RobotError::NotSolid`] if a shape of the body has no inside: see [`OwnedShape::solid`].
+    pub fn make_solid(&mut self, name: &str) -> Result<(), RobotError> {
+        let refused = |source| RobotError::NotSolid { body: name.to_owned(), source };
+        self.reshape(name, |part| Ok((part.bare.clone().solid().map_err(refused)?, part.margin)))
+    }
+
+    /// Makes the parts of a body anew, each of a bare shape and with a margin; all of them or none.
+    fn reshape(
+        &mut self,
+        name: &str,
+        shape: impl Fn(&Part) -> Result<(OwnedShape, f64), RobotError>,
+    ) -> Result<(), RobotError> {
+        let body = self.body(name)?;
         let setting = Arc::make_mut(&mut self.setting);
         let mut parts = setting.parts.clone();
-        for part in parts.iter_mut().filter(|part| part.body == number) {
-            let (on, bare) = ((part.group, part.is_still), part.bare.clone());
-            // A radius of its own would make up for a negative margin.
-            bare.clone().rounded(margin)?;
-            *part = Part::new(number, on, part.origin, bare, margin)?;
+        for part in parts.iter_mut().filter(|part| part.body == body) {
+            let (bare, margin) = shape(part)?;
+            *part = Part::new(body, (part.group, part.is_still), part.origin, bare, margin)?;
         }
         setting.parts = parts;
         self.is_stale = true;

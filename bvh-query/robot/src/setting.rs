@@ -3,7 +3,7 @@
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
 use crate::model::{Chain, Model};
-use bvh_query::{OwnedShape, Shape};
+use bvh_query::{OwnedShape, Pose, Shape};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -14,6 +14,8 @@ pub(crate) struct Body {
     pub(crate) is_link: bool,
     /// The link that it is attached to.
     pub(crate) link: Option<usize>,
+    /// Where it is: in the frame of that link or, as an obstacle, in the world. A link has the identity.
+    pub(crate) pose: Pose,
 }
 
 /// A shape of a body.
@@ -30,6 +32,7 @@ pub(crate) struct Part {
     pub(crate) shape: OwnedShape,
     /// The shape as it was given.
     pub(crate) bare: OwnedShape,
+    pub(crate) margin: f64,
     /// The middle of a ball around it, in its own frame and in the group, and the ball's radius.
     pub(crate) middle: Point,
     pub(crate) centre: Point,
@@ -51,7 +54,20 @@ impl Part {
         let (middle_of_box, half) = bounds(shape.shape());
         let (middle, radius) = ball(shape.shape());
         let centre = origin.place(middle);
-        Ok(Self { body, group, is_still, origin, shape, bare, middle, centre, radius, middle_of_box, half })
+        Ok(Self {
+            body,
+            group,
+            is_still,
+            origin,
+            shape,
+            bare,
+            margin,
+            middle,
+            centre,
+            radius,
+            middle_of_box,
+            half,
+        })
     }
 }
 
@@ -122,6 +138,11 @@ impl Setting {
             }
         }
         self.pairs = pairs;
+    }
+
+    /// Returns the names of the bodies of two parts.
+    pub(crate) fn names(&self, parts: [usize; 2]) -> [String; 2] {
+        parts.map(|part| self.name(part).to_owned())
     }
 
     /// Returns the name of the body of a part.

@@ -1,6 +1,7 @@
 //! Robots: where their links stand, what they answer, and what is refused.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod bodies;
 mod kinematics;
 mod misuse;
 mod questions;
