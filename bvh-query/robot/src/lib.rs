@@ -5,7 +5,8 @@
 //!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
 //!                                                  ├──> questions about configurations (questions, asker)
-//!                                                  └──> motions, certain at every moment (motions, pair_path, edge, turns)
+//!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns)
+//!                                                  └──> plain data, and back (parts)
 //! ```
 //!
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
@@ -20,6 +21,7 @@ mod motions;
 mod options;
 mod packages;
 mod pair_path;
+mod parts;
 mod questions;
 mod robot;
 mod setting;
@@ -35,6 +37,7 @@ pub use edge::Edge;
 pub use error::RobotError;
 pub use motions::RobotMotion;
 pub use options::{Base, Geometry, RobotOptions};
+pub use parts::{OtherBody, RobotParts};
 pub use questions::RobotDistance;
 pub use robot::Robot;
 pub use srdf::{Group, State};

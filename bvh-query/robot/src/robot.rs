@@ -3,11 +3,13 @@
 use crate::asker::Asker;
 use crate::error::RobotError;
 use crate::frame::Frame;
+use crate::model::{Link, Model};
 use crate::options::RobotOptions;
+use crate::parts::Source;
 use crate::setting::{Body, Part, Setting};
 use crate::shapes::Shapes;
 use crate::srdf::{self, Group, Semantics, State};
-use crate::urdf;
+use crate::urdf::{self, Element};
 use bvh_query::{NumberError, OwnedShape, Pose, QueryError};
 use std::collections::HashSet;
 use std::path::Path;
@@ -45,9 +47,10 @@ use std::sync::Arc;
 pub struct Robot {
     pub(crate) setting: Arc<Setting>,
     pub(crate) asker: Asker,
+    pub(crate) source: Arc<Source>,
     semantics: Arc<Semantics>,
     /// Pairs of bodies whose contact is allowed, in order.
-    allowed: Arc<HashSet<[usize; 2]>>,
+    pub(crate) allowed: Arc<HashSet<[usize; 2]>>,
     /// The setting lacks pairs after a change.
     is_stale: bool,
 }
@@ -58,6 +61,7 @@ impl Clone for Robot {
         Self {
             setting: Arc::clone(&self.setting),
             asker: self.asker.clone(),
+            source: Arc::clone(&self.source),
             semantics: Arc::clone(&self.semantics),
             allowed: Arc::clone(&self.allowed),
             is_stale: self.is_stale,
@@ -67,6 +71,7 @@ impl Clone for Robot {
     /// Makes this a robot like another one, which keeps what it remembers of its own questions. None of it affects an answer.
     fn clone_from(&mut self, source: &Self) {
         self.setting = Arc::clone(&source.setting);
+        self.source = Arc::clone(&source.source);
         self.semantics = Arc::clone(&source.semantics);
         self.allowed = Arc::clone(&source.allowed);
         self.is_stale = source.is_stale;
@@ -80,23 +85,36 @@ impl Robot {
     /// [`RobotError`] with the file, the link or joint, and what is wrong.
     pub fn from_urdf(path: impl AsRef<Path>, options: &RobotOptions) -> Result<Self, RobotError> {
         let path = path.as_ref();
-        let (model, elements) = urdf::read(path, options)?;
-        let semantics =
-            options.srdf.as_ref().map_or(Ok(Semantics::default()), |srdf| srdf::read(srdf, &model))?;
-        let body = |link: &crate::model::Link| {
+        let source = Source::read(path, options)?;
+        let mut shapes = Shapes::new(path, options);
+        Self::of_source(source, |model, elements| {
+            let make = |element: &Element| shapes.make(element, &model.links[element.link].name);
+            elements.iter().map(make).collect()
+        })
+    }
+
+    /// Makes a robot of its files' texts and of the shapes of its links, one for each element, in the order of the links.
+    pub(crate) fn of_source(
+        source: Source,
+        shapes: impl FnOnce(&Model, &[Element]) -> Result<Vec<OwnedShape>, RobotError>,
+    ) -> Result<Self, RobotError> {
+        let (model, mut elements) = urdf::read(&source.path, &source.urdf, source.geometry, source.base)?;
+        let semantics = match &source.srdf {
+            Some((path, text)) => srdf::read(path, text, &model)?,
+            None => Semantics::default(),
+        };
+        let body = |link: &Link| {
             Some(Body { name: link.name.clone(), is_link: true, link: None, pose: Pose::IDENTITY })
         };
         let bodies = model.links.iter().map(body).collect();
-        let mut shapes = Shapes::new(path, options);
+        // In the order of the links, so that answers are.
+        elements.sort_by_key(|element| element.link);
         let mut parts = Vec::new();
-        for element in &elements {
-            let shape = shapes.make(element, &model.links[element.link].name)?;
+        for (element, shape) in elements.iter().zip(shapes(&model, &elements)?) {
             let link = &model.links[element.link];
             let origin = link.origin.of(&element.origin);
             parts.push(Part::new(element.link, (link.group, false), origin, shape, 0.0)?);
         }
-        // In the order of the links, so that answers are.
-        parts.sort_by_key(|part| part.body);
         let disabled = semantics.disabled.iter();
         let numbers = |[a, b]: &[String; 2]| Some([model.link(a).ok()?, model.link(b).ok()?]);
         let allowed = disabled.filter_map(numbers).map(|[a, b]| [a.min(b), a.max(b)]).collect();
@@ -104,6 +122,7 @@ impl Robot {
         let mut robot = Self {
             setting: Arc::new(setting),
             asker: Asker::new()?,
+            source: Arc::new(source),
             semantics: Arc::new(semantics),
             allowed: Arc::new(allowed),
             is_stale: true,
@@ -364,7 +383,7 @@ impl Robot {
         parts.iter().filter(|part| part.body == body).map(placed).collect()
     }
 
-    fn bodies(&self, a: &str, b: &str) -> Result<[usize; 2], RobotError> {
+    pub(crate) fn bodies(&self, a: &str, b: &str) -> Result<[usize; 2], RobotError> {
         let (a, b) = (self.body(a)?, self.body(b)?);
         Ok([a.min(b), a.max(b)])
     }

@@ -3,7 +3,7 @@
 use crate::error::RobotError;
 use crate::frame::Frame;
 use crate::model::Model;
-use crate::xml::{Description, children, text_of};
+use crate::xml::{Description, children};
 use roxmltree::Node;
 use std::path::Path;
 
@@ -38,11 +38,10 @@ pub struct State {
     pub values: Vec<(usize, f64)>,
 }
 
-/// Reads a file about a robot. Names of links and joints that the robot does not have are passed over, because files are often
+/// Reads the text of a file about a robot. Names of links and joints that the robot does not have are passed over, because files are often
 /// shared by variants of a robot.
-pub(crate) fn read(path: &Path, model: &Model) -> Result<Semantics, RobotError> {
-    let text = text_of(path)?;
-    let description = &Description::parse(path, &text)?;
+pub(crate) fn read(path: &Path, text: &str, model: &Model) -> Result<Semantics, RobotError> {
+    let description = &Description::parse(path, text)?;
     let of = |node, name| description.attribute(node, name).map(str::to_owned);
     let mut semantics = Semantics::default();
     let (mut enabled, mut silent) = (Vec::new(), Vec::new());

@@ -6,8 +6,8 @@
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
 use crate::model::{Kind, Link, Model, Value};
-use crate::options::{Base, Geometry, RobotOptions};
-use crate::xml::{Description, child, children, text_of};
+use crate::options::{Base, Geometry};
+use crate::xml::{Description, child, children};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -33,13 +33,17 @@ pub(crate) enum Described {
     Capsule { radius: f64, length: f64 },
 }
 
-/// Reads a robot.
-pub(crate) fn read(path: &Path, options: &RobotOptions) -> Result<(Model, Vec<Element>), RobotError> {
-    let text = text_of(path)?;
-    let urdf = Urdf { description: &Description::parse(path, &text)? };
-    let model = urdf.model(options.base)?;
+/// Reads the text of a file about a robot.
+pub(crate) fn read(
+    path: &Path,
+    text: &str,
+    geometry: Geometry,
+    base: Base,
+) -> Result<(Model, Vec<Element>), RobotError> {
+    let urdf = Urdf { description: &Description::parse(path, text)? };
+    let model = urdf.model(base)?;
     let mut elements = Vec::new();
-    let name = match options.geometry {
+    let name = match geometry {
         Geometry::Collision => "collision",
         Geometry::Visual => "visual",
     };

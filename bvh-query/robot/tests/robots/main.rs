@@ -4,5 +4,6 @@
 mod bodies;
 mod kinematics;
 mod misuse;
+mod parts;
 mod questions;
 mod turns;
