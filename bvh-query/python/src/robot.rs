@@ -1,18 +1,22 @@
 //! Robots: a question takes a snapshot, and runs without Python's lock and without that of the robot.
 
-use crate::answers::array;
+use crate::answers::{array, matrix};
 use crate::arguments::pose_or_identity;
 use crate::asking::{detached, in_turns, on_pool};
 use crate::errors::{backend_error, bake_error, open_error, query_error, question_error, system_error};
 use crate::mesh::Mesh;
 use crate::paths::locked;
-use bvh_query::{MotionOptions, Pose};
-use cbvh_robot::{Base, Edge, Geometry, RobotDistance, RobotError, RobotMotion, RobotOptions};
+use bvh_query::{MotionOptions, OwnedShape, Pose};
+use cbvh_robot::{
+    Base, Edge, Geometry, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions, RobotParts,
+};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+use std::collections::HashMap;
+use std::ffi::OsString;
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// A robot among obstacles.
 #[pyclass(frozen, module = "cbvh._cbvh")]
@@ -22,7 +26,24 @@ struct Shared {
     robot: cbvh_robot::Robot,
     /// Robots that ask no question now, which hold what they remember of earlier ones.
     idle: Vec<cbvh_robot::Robot>,
+    /// What callers added as obstacles and attached objects, by name: meshes know the files that they are in.
+    meshes: HashMap<String, Arc<Py<PyAny>>>,
 }
+
+/// A file's name and its text.
+type Text = (OsString, String);
+/// The shape of a link: the number of its core, the radius, and whether it is solid.
+type LinkRow = (usize, f64, bool);
+/// An obstacle or an attached object: its name, what the caller added, whether it is solid, its link, and its pose.
+type OtherRow = (String, Py<PyAny>, bool, Option<String>, [f64; 16]);
+/// What a robot is made of: the texts, whether shapes are visual, the base, cores, links, others, margins and allowed pairs.
+type Parts = (
+    (Text, Option<Text>, bool, &'static str),
+    (Vec<Mesh>, Vec<LinkRow>),
+    Vec<OtherRow>,
+    Vec<(String, f64)>,
+    Vec<[String; 2]>,
+);
 
 /// The nearest bodies: whether there are any, the distance and its bounds, both names, and the points in the world.
 type Nearest = (bool, [f64; 3], [String; 2], [[f64; 3]; 2]);
@@ -42,13 +63,35 @@ fn robot_error(error: RobotError) -> PyErr {
         RobotError::Cache { source } => open_error(source),
         RobotError::Unknown { .. } => PyKeyError::new_err(message),
         RobotError::Query(source) => query_error(source),
-        RobotError::Pair { source, .. } => question_error(&source, message),
+        RobotError::NotSolid { source, .. } | RobotError::Pair { source, .. } => {
+            question_error(&source, message)
+        }
         RobotError::Backend(error) => backend_error(error),
         _ => PyValueError::new_err(message),
     }
 }
 
 impl Robot {
+    fn of(robot: cbvh_robot::Robot, meshes: HashMap<String, Arc<Py<PyAny>>>) -> Self {
+        Self(Mutex::new(Shared { robot, idle: Vec::new(), meshes }))
+    }
+
+    /// Adds a body, which callers know as `known`.
+    fn add(
+        &self,
+        py: Python<'_>,
+        (name, known): (String, Py<PyAny>),
+        add: impl FnOnce(&mut cbvh_robot::Robot, &str) -> Result<(), RobotError> + Send,
+    ) -> PyResult<()> {
+        let added = detached(py, || {
+            let shared = &mut *locked(&self.0);
+            add(&mut shared.robot, &name)?;
+            shared.meshes.insert(name, Arc::new(known));
+            Ok(())
+        });
+        added.map_err(robot_error)
+    }
+
     fn change<T: Send>(
         &self,
         py: Python<'_>,
@@ -105,6 +148,14 @@ fn rows(values: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec<f64>>> {
     Ok((0..count).map(|row| flat[row * width..][..width].to_vec()).collect())
 }
 
+fn base_of(name: &str) -> Base {
+    match name {
+        "planar" => Base::Planar,
+        "floating" => Base::Floating,
+        _ => Base::Fixed,
+    }
+}
+
 fn options(clearance: f64, tolerance: Option<f64>) -> MotionOptions {
     MotionOptions::new().clearance(clearance).tolerance(tolerance)
 }
@@ -132,19 +183,96 @@ impl Robot {
         let mut options = RobotOptions::default();
         (options.packages, options.srdf, options.cache) = (packages, srdf, cache);
         options.geometry = if visual { Geometry::Visual } else { Geometry::Collision };
-        options.base = match base {
-            "planar" => Base::Planar,
-            "floating" => Base::Floating,
-            _ => Base::Fixed,
-        };
+        options.base = base_of(base);
         options.cylinder_error = cylinder_error;
         let robot = detached(py, || on_pool(|| cbvh_robot::Robot::from_urdf(path, &options)))?;
-        Ok(Self(Mutex::new(Shared { robot: robot.map_err(robot_error)?, idle: Vec::new() })))
+        Ok(Self::of(robot.map_err(robot_error)?, HashMap::new()))
     }
 
     fn copy(&self, py: Python<'_>) -> Self {
-        let robot = detached(py, || locked(&self.0).robot.snapshot());
-        Self(Mutex::new(Shared { robot, idle: Vec::new() }))
+        let (robot, meshes) = detached(py, || {
+            let shared = &mut *locked(&self.0);
+            (shared.robot.snapshot(), shared.meshes.clone())
+        });
+        Self::of(robot, meshes)
+    }
+
+    /// All that the robot holds. Links that have one core have one number of it.
+    fn parts(&self, py: Python<'_>) -> Parts {
+        let (parts, meshes) = detached(py, || {
+            let shared = locked(&self.0);
+            (shared.robot.to_parts(), shared.meshes.clone())
+        });
+        let mut cores: Vec<OwnedShape> = Vec::new();
+        let mut link = |shape: &OwnedShape| {
+            let bytes = shape.bvh().bytes().as_ptr();
+            let known = cores.iter().position(|core| core.bvh().bytes().as_ptr() == bytes);
+            let number = known.unwrap_or_else(|| {
+                cores.push(shape.bvh().clone().into());
+                cores.len() - 1
+            });
+            (number, shape.shape().radius(), shape.shape().is_solid())
+        };
+        let links = parts.links.iter().map(&mut link).collect();
+        let other = |OtherBody { name, shape, link, pose }: OtherBody| {
+            let Some(known) = meshes.get(&name) else {
+                unreachable!("a body and its mesh are added and removed together")
+            };
+            let known = known.clone_ref(py);
+            (name, known, shape.shape().is_solid(), link, matrix(&pose))
+        };
+        let others = parts.others.into_iter().map(other).collect();
+        let text = |(path, text): (PathBuf, String)| (path.into_os_string(), text);
+        let base = match parts.base {
+            Base::Fixed => "fixed",
+            Base::Planar => "planar",
+            Base::Floating => "floating",
+        };
+        (
+            (text(parts.urdf), parts.srdf.map(text), parts.geometry == Geometry::Visual, base),
+            (cores.into_iter().map(Mesh::of).collect(), links),
+            others,
+            parts.margins,
+            parts.allowed,
+        )
+    }
+
+    /// A robot of what another one holds. A link has its core, a radius, and whether it is solid.
+    #[staticmethod]
+    #[expect(clippy::type_complexity, reason = "it is what `parts` returns, with meshes in place of numbers")]
+    fn of_parts(
+        py: Python<'_>,
+        texts: (Text, Option<Text>, bool, String),
+        links: Vec<(Bound<'_, Mesh>, f64, bool)>,
+        others: Vec<(String, Bound<'_, Mesh>, Py<PyAny>, Option<String>, Bound<'_, PyAny>)>,
+        margins: Vec<(String, f64)>,
+        allowed: Vec<[String; 2]>,
+    ) -> PyResult<Self> {
+        let (urdf, srdf, visual, base) = texts;
+        let link = |(core, radius, is_solid): (Bound<'_, Mesh>, f64, bool)| {
+            let shape = core.get().shape().clone().rounded(radius)?;
+            if is_solid { shape.solid() } else { Ok(shape) }
+        };
+        let links = links.into_iter().map(link).collect::<Result<_, _>>().map_err(query_error)?;
+        let (mut bodies, mut meshes) = (Vec::new(), HashMap::new());
+        for (name, mesh, known, link, pose) in others {
+            let (shape, pose) = (mesh.get().shape().clone(), pose_or_identity(Some(&pose), "pose")?);
+            meshes.insert(name.clone(), Arc::new(known));
+            bodies.push(OtherBody { name, shape, link, pose });
+        }
+        let text = |(path, text): Text| (PathBuf::from(path), text);
+        let parts = RobotParts {
+            urdf: text(urdf),
+            srdf: srdf.map(text),
+            geometry: if visual { Geometry::Visual } else { Geometry::Collision },
+            base: base_of(&base),
+            links,
+            others: bodies,
+            margins,
+            allowed,
+        };
+        let robot = detached(py, || cbvh_robot::Robot::from_parts(parts)).map_err(robot_error)?;
+        Ok(Self::of(robot, meshes))
     }
 
     fn name(&self) -> String {
@@ -193,34 +321,41 @@ impl Robot {
             .map_err(robot_error)
     }
 
-    #[pyo3(signature = (name, mesh, pose))]
     fn add_obstacle(
         &self,
         py: Python<'_>,
         name: String,
         mesh: &Bound<'_, Mesh>,
+        known: Py<PyAny>,
         pose: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (shape, pose) = (mesh.get().shape().clone(), pose_or_identity(pose, "pose")?);
-        self.change(py, |robot| robot.add_obstacle(name, shape, &pose))
+        self.add(py, (name, known), |robot, name| robot.add_obstacle(name, shape, &pose))
     }
 
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn attach(
         &self,
         py: Python<'_>,
         name: String,
         mesh: &Bound<'_, Mesh>,
+        known: Py<PyAny>,
         link: &str,
         pose: Option<&Bound<'_, PyAny>>,
         may_touch: Vec<String>,
     ) -> PyResult<()> {
         let (shape, pose) = (mesh.get().shape().clone(), pose_or_identity(pose, "pose")?);
         let may_touch: Vec<&str> = may_touch.iter().map(String::as_str).collect();
-        self.change(py, |robot| robot.attach(name, shape, link, &pose, &may_touch))
+        self.add(py, (name, known), |robot, name| robot.attach(name, shape, link, &pose, &may_touch))
     }
 
     fn remove(&self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.change(py, |robot| robot.remove(name))
+        let removed = detached(py, || {
+            let shared = &mut *locked(&self.0);
+            shared.robot.remove(name)?;
+            Ok(shared.meshes.remove(name))
+        });
+        removed.map(drop).map_err(robot_error)
     }
 
     fn set_pose(&self, py: Python<'_>, name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -230,6 +365,28 @@ impl Robot {
 
     fn set_margin(&self, py: Python<'_>, name: &str, margin: f64) -> PyResult<()> {
         self.change(py, |robot| robot.set_margin(name, margin))
+    }
+
+    fn make_solid(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.change(py, |robot| robot.make_solid(name))
+    }
+
+    /// The nearest goals, flat, for each row.
+    fn nearest_turns<'py>(
+        &self,
+        py: Python<'py>,
+        from: PyReadonlyArray2<'_, f64>,
+        to: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (from, to) = (rows(&from)?, rows(&to)?);
+        let nearest = detached(py, || {
+            self.ask(|robot| {
+                let of =
+                    |(from, to): (&Vec<f64>, &Vec<f64>)| robot.nearest_turns(from, to).map_err(robot_error);
+                from.iter().zip(&to).map(of).collect::<PyResult<Vec<Vec<f64>>>>()
+            })
+        })?;
+        Ok(array(py, nearest.into_iter().flatten()))
     }
 
     /// The poses of all links, flat, for each row.
@@ -245,7 +402,7 @@ impl Robot {
                 rows.iter().map(of).collect::<PyResult<Vec<Vec<Pose>>>>()
             })
         })?;
-        Ok(array(py, poses.iter().flatten().flat_map(crate::answers::matrix)))
+        Ok(array(py, poses.iter().flatten().flat_map(matrix)))
     }
 
     fn collide<'py>(
@@ -278,6 +435,22 @@ impl Robot {
             parallel,
             |robot, row| robot.pairs_in_contact(row),
             |robot, rows| robot.pairs_in_contact_many(rows),
+        )
+    }
+
+    fn pairs_inside(
+        &self,
+        py: Python<'_>,
+        joints: PyReadonlyArray2<'_, f64>,
+        parallel: bool,
+    ) -> PyResult<Vec<Vec<[String; 2]>>> {
+        let rows = rows(&joints)?;
+        self.each(
+            py,
+            &rows,
+            parallel,
+            |robot, row| robot.pairs_inside(row),
+            |robot, rows| robot.pairs_inside_many(rows),
         )
     }
 

@@ -1,6 +1,8 @@
 """Tests of the collision manager: what trimesh documents, by brute force over pairs of meshes. It needs no trimesh."""
 
+import copy
 import itertools
+import pickle
 import threading
 import types
 import unittest
@@ -229,6 +231,51 @@ class Manager(unittest.TestCase):
         for thread in threads:
             thread.join(60)
         self.assertFalse(failures or any(thread.is_alive() for thread in threads))
+
+
+class Copies(unittest.TestCase):
+    """Managers that are copied and pickled, and objects that are solid."""
+
+    def test_copies_and_pickles_are_managers_of_their_own(self):
+        manager, _ = Manager.manager(self, 1, 12)
+        manager.add_object(("a", 1), cbvh.sphere(0.5), random_poses(7, 1, 1.0)[0].astype(np.float32), radius=0.25)
+        manager.add_object("full", solid(9.0), solid=True)
+        manager.set_transform("part 3", shifts([0.1, 0, 0])[0])
+        single = solid(0.5), shifts([0.2, 0.3, 0])[0]
+
+        def answers(manager):
+            return (
+                manager.in_collision_internal(return_names=True),
+                manager.in_collision_single(*single, return_names=True),
+                manager.min_distance_internal("part 1", return_names=True),
+                [(pair.names, pair.point.tolist()) for pair in manager.in_collision_internal(return_data=True)[1]],
+            )
+
+        expected = answers(manager)
+        for other in (copy.copy(manager), copy.deepcopy(manager), pickle.loads(pickle.dumps(manager))):
+            self.assertEqual(answers(other), expected)
+            other.remove_object("full")
+            self.assertNotEqual(answers(other), expected)
+            other.add_object("full", solid(9.0), solid=True)
+            self.assertEqual(answers(other)[:3], expected[:3])
+        self.assertEqual(answers(manager), expected)
+
+    def test_what_is_inside_a_mesh_collides_if_that_is_solid(self):
+        for kinds in ({}, {"solid": True}):
+            manager, is_solid = cbvh.CollisionManager(), bool(kinds)
+            manager.add_object("shell", solid(4.0), **kinds)
+            self.assertIs(manager.in_collision_single(solid()), is_solid)
+            manager.add_object("part", solid())
+            self.assertIs(manager.in_collision_internal(), is_solid)
+            other = cbvh.CollisionManager()
+            other.add_object("part", solid())
+            self.assertIs(other.in_collision_single(solid(4.0), **kinds), is_solid)
+            self.assertEqual(other.min_distance_single(solid(4.0), **kinds) > 0, not is_solid)
+        opened = solid()
+        opened.faces = opened.faces[1:]
+        with self.assertRaises(ValueError) as caught:
+            manager.add_object("opened", opened, solid=True)
+        self.assertIn("closed", str(caught.exception))
 
 
 class Primitives(unittest.TestCase):

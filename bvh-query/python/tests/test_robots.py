@@ -1,20 +1,23 @@
 """Tests of robots: kinematics in numpy, questions about meshes pair by pair, samples of motions, misuse and threads."""
 
 import concurrent.futures
+import copy
 import importlib.metadata
 import itertools
 import math
 import pathlib
+import pickle
 import tempfile
 import threading
 import unittest
+import warnings
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
 import cbvh
 from cbvh import MotionKind
-from common import TESTDATA, check_errors, shifts
+from common import TESTDATA, check_errors, cube, shifts
 
 URDF = TESTDATA / "robot" / "robot.urdf"
 NEIGHBOURS = [("base", "turret"), ("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "hand")]
@@ -566,6 +569,281 @@ class Changing(unittest.TestCase):
             finally:
                 stop.set()
             changing.result()
+
+
+TURNING = """<robot name="turning"><link name="root"/>
+<link name="arm"><collision><origin xyz="1 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
+<link name="limited"/><link name="geared"/><link name="half"/>
+<joint name="turn" type="continuous"><parent link="root"/><child link="arm"/><axis xyz="0 0 1"/></joint>
+<joint name="limited" type="revolute"><parent link="root"/><child link="limited"/>
+<limit lower="-6.3" upper="6.3" effort="1" velocity="1"/></joint>
+<joint name="geared" type="continuous"><parent link="root"/><child link="geared"/></joint>
+<joint name="half" type="continuous"><parent link="root"/><child link="half"/><mimic joint="geared" multiplier="0.5"/></joint>
+</robot>"""
+
+
+class Turning(unittest.TestCase):
+    """The short way of joints that turn without limits."""
+
+    def setUp(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "turning.urdf"
+            path.write_text(TURNING)
+            self.robot = cbvh.Robot.from_urdf(path, base="planar")
+
+    def test_the_short_way_is_free_where_the_long_one_is_not(self):
+        robot = self.robot
+        robot.add_obstacle(cbvh.sphere(0.3), shifts([1, 0, 0])[0])
+        start, goal = robot.q(turn=3.0, limited=3, geared=3), robot.q(turn=-3.0, limited=-3, geared=-3)
+        self.assertFalse(robot.is_free(start, goal))
+        self.assertEqual(robot.motion(start, goal).kind, MotionKind.HIT)
+        near = robot.nearest_turns(start, goal)
+        self.assertTrue(robot.is_free(start, near))
+        self.assertEqual(robot.motion(start, near).kind, MotionKind.FREE)
+        changed = near != goal
+        self.assertEqual([name for name, is_changed in zip(robot.joints, changed) if is_changed], ["turn"])
+        self.assertEqual(robot.collide(near), robot.collide(goal))
+
+    def test_rows(self):
+        robot, rng = self.robot, np.random.default_rng(1)
+        starts, goals = rng.uniform(-50, 50, (2, 40, len(robot.joints)))
+        near = robot.nearest_turns(starts, goals)
+        self.assertEqual(near.shape, goals.shape)
+        turns = [name in ("base/theta", "turn") for name in robot.joints]
+        self.assertTrue((np.abs(near - starts)[:, turns] <= math.pi * (1 + 1e-9)).all())
+        self.assertTrue((near == goals)[:, np.logical_not(turns)].all())
+        np.testing.assert_allclose(np.exp(1j * near[:, turns]), np.exp(1j * goals[:, turns]), atol=1e-13)
+        np.testing.assert_allclose(robot.link_poses(near), robot.link_poses(goals), atol=1e-12)
+        self.assertTrue((robot.nearest_turns(starts, near) == near).all())
+        self.assertEqual(robot.nearest_turns(starts[0], goals[0]).tolist(), near[0].tolist())
+        for one, many in (((starts[0], goals), goals), ((starts, goals[0]), starts)):
+            rows = [robot.nearest_turns(*row) for row in zip(*np.broadcast_arrays(*one))]
+            np.testing.assert_array_equal(robot.nearest_turns(*one), rows)
+        self.assertEqual(robot.nearest_turns(starts[:0], goals[:0]).shape, (0, len(robot.joints)))
+        check_errors(
+            self,
+            [
+                (ValueError, "q1: expected 40 rows, as q0, found 39", robot.nearest_turns, starts, goals[1:]),
+                (ValueError, "q0: expected shape", robot.nearest_turns, starts[:, 1:], goals),
+                (ValueError, "joint turn: expected an angle within", robot.nearest_turns, robot.q(), robot.q(turn=2e9)),
+                (ValueError, "joint turn: expected a finite", robot.nearest_turns, robot.q(), robot.q(turn=math.nan)),
+            ],
+        )
+
+
+class Inside(unittest.TestCase):
+    """Bodies inside others, which do not touch them unless they are solid."""
+
+    def setUp(self):
+        self.robot, self.q = cbvh.Robot.from_urdf(URDF), np.zeros(4)
+        for a, b in self.robot.pairs:
+            self.robot.allow(a, b)
+        self.room = cbvh.bake(*cube(9))
+
+    def warned(self, ask):
+        """The words of the warnings while a question is asked."""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            ask()
+        self.assertTrue(all(of.category is cbvh.InsideWarning and of.filename == __file__ for of in caught))
+        return [str(of.message) for of in caught]
+
+    def test_a_robot_in_a_room_is_told_apart_from_a_free_one(self):
+        robot, q = self.robot, self.q
+        inside = [(link, "room") for link in robot.links]
+        robot.add_obstacle(self.room, name="room", solid=False)
+        self.assertEqual(self.warned(lambda: robot.collide(q)), [])
+        self.assertFalse(robot.collide(q))
+        self.assertTrue(robot.is_free(q, q))
+        self.assertEqual(robot.pairs_inside(q), inside)
+        rows = random_rows(robot, 1, 20)
+        for parallel in (False, True):
+            self.assertEqual(robot.pairs_inside(rows, parallel=parallel), [robot.pairs_inside(row) for row in rows])
+        robot.make_solid("room")
+        self.assertTrue(robot.collide(q))
+        self.assertFalse(robot.is_free(q, q))
+        self.assertEqual(robot.pairs_inside(q), [])
+        robot.remove("room")
+        robot.add_obstacle(self.room, name="room", solid=True)
+        self.assertEqual(robot.pairs_in_contact(q), inside)
+        robot.remove("room")
+        # An obstacle inside a link, and one inside what is attached.
+        robot.add_obstacle(cbvh.sphere(1e-3), robot.link_poses(q)[2] @ shifts([0, 0, 0.1])[0], name="pea")
+        self.assertEqual(robot.pairs_inside(q), [("pea", "upper_arm")])
+        robot.make_solid("upper_arm")
+        self.assertEqual(robot.pairs_in_contact(q), [("upper_arm", "pea")])
+        robot.remove("pea")
+        for solid in (False, True):
+            name = robot.attach(cbvh.bake(*cube(3)), "hand", solid=solid)
+            robot.add_obstacle(cbvh.sphere(0.01), robot.link_poses(q)[4] @ shifts([1, 0, 0])[0], name="pea")
+            self.assertEqual((robot.collide(q), (("pea", name) in robot.pairs_inside(q))), (solid, not solid))
+            robot.remove("pea")
+            robot.remove(name)
+
+    def test_a_start_inside_an_obstacle_warns_once(self):
+        q = self.q
+        asked = {
+            "collide": lambda robot: robot.collide(q),
+            "is_free": lambda robot: robot.is_free([q, q + 1], [q, q]),
+            "motion": lambda robot: robot.motion(q, q),
+            "first_hit": lambda robot: robot.first_hit([q, q]),
+            "motion_along": lambda robot: robot.motion_along(q[:, None]),
+        }
+        for name, ask in asked.items():
+            with self.subTest(name):
+                robot = self.robot.copy()
+                robot.add_obstacle(cbvh.bake(*cube(0.1)), shifts([7, 0, 0])[0])
+                self.assertEqual(self.warned(lambda: ask(robot)), [])
+                robot.add_obstacle(self.room, name="room")
+                robot.add_obstacle(cbvh.bake(*cube(20)), name="hall")
+                again = pickle.loads(pickle.dumps(robot))
+                words = [
+                    f"{link} is inside the surface of {outer}, which it does not touch; add {outer} with solid=True"
+                    for link in robot.links
+                    for outer in ("room", "hall")
+                ]
+                for one in (robot, robot.copy(), again):
+                    with self.subTest(one):
+                        found = self.warned(lambda: ask(one))
+                        self.assertEqual([message.split(" if it is")[0] for message in found], words)
+                        self.assertEqual(self.warned(lambda: ask(one)), [])
+        # Nothing is said of what is solid, open, or baked without what tells; and questions without rows look at nothing.
+        robot = self.robot
+        vertices, faces = cube(9)
+        robot.add_obstacle(cbvh.bake(vertices, faces[1:]), name="open")
+        robot.add_obstacle(cbvh.bake(vertices, faces, topology=False), name="unknown")
+        robot.add_obstacle(self.room, name="full", solid=True)
+        self.assertEqual(self.warned(lambda: robot.collide(np.zeros((0, 4)))), [])
+        self.assertEqual(self.warned(lambda: robot.collide(q)), [])
+        check_errors(
+            self,
+            [
+                (ValueError, "topology", robot.pairs_inside, q),
+                (ValueError, "open: expected closed objects", robot.make_solid, "open"),
+                (ValueError, "topology", robot.make_solid, "unknown"),
+                (KeyError, "'nothing'", robot.make_solid, "nothing"),
+                (ValueError, "closed", lambda: robot.add_obstacle(cbvh.bake(vertices, faces[1:]), solid=True)),
+                (ValueError, "closed", lambda: robot.attach(cbvh.bake(vertices, faces[1:]), "hand", solid=True)),
+            ],
+        )
+
+    def test_the_margin_of_a_link_is_not_that_of_what_is_attached(self):
+        robot, q = self.robot, self.q
+        robot.attach(cbvh.sphere(0.1), "hand", shifts([0, 0, 0.3])[0], name="tool")
+        for link in robot.links[:-1]:
+            robot.allow(link, "tool")
+        robot.add_obstacle(cbvh.sphere(0.1), robot.link_poses(q)[4] @ shifts([0, 0, 0.7])[0])
+        gap = robot.distance(q)
+        self.assertAlmostEqual(gap.distance, 0.2, delta=1e-6)
+        robot.set_margin("hand", 0.05)
+        self.assertEqual(robot.distance(q).distance, gap.distance)
+        robot.set_margin("tool", 0.05)
+        self.assertAlmostEqual(robot.distance(q).distance, gap.distance - 0.05, delta=1e-12)
+
+
+class Copies(unittest.TestCase):
+    """Copies and pickles give the same answers."""
+
+    def changed(self, folder):
+        """A robot after all kinds of changes; its files are gone when it is asked."""
+        urdf, srdf = folder / "kinds.urdf", folder / "kinds.srdf"
+        mesh = '<link name="c"><collision><geometry><mesh filename="hand.obj" scale="0.001 0.001 0.001"/></geometry></collision></link>'
+        text = KINDS.replace('<link name="c"/>', mesh).replace('<link name="d"/>', mesh.replace('"c"', '"d"'))
+        urdf.write_text(text)
+        (folder / "hand.obj").write_text((URDF.parent / "hand.obj").read_text())
+        srdf.write_text(
+            '<robot name="kinds"><group name="g"><joint name="slide"/></group><group_state name="s" group="g">'
+            '<joint name="slide" value="0.2"/></group_state><disable_collisions link1="foot" link2="c"/></robot>'
+        )
+        robot = cbvh.Robot.from_urdf(urdf, srdf=srdf, base="floating", cylinder_error=1e-2)
+        mapped = cbvh.bake(*cube(0.3))
+        mapped.save(folder.parent / "mapped.cbvh")
+        self.mapped = cbvh.open(folder.parent / "mapped.cbvh")
+        robot.add_obstacle(self.mapped, name="gone")
+        robot.add_obstacle(self.mapped, shifts([0.5, 0, 0.5])[0], name="crate")
+        robot.attach(cbvh.capsule(0.02, 0.3), "d", cbvh.pose([0.1, 0.2, 0.3], [0.5, -0.5, 0.5, 0.5]), may_touch=["b"])
+        robot.add_obstacle(cbvh.bake(*cube(0.5)).rounded(0.01), name="box", solid=True)
+        robot.remove("gone")
+        robot.set_pose("box", shifts([0, 0.9, 0.3])[0])
+        for name, margin in (("foot", 0.01), ("c", 0.1 / 3), ("attached 1", 0.02), ("box", 1e-3)):
+            robot.set_margin(name, margin)
+        robot.make_solid("crate")
+        robot.make_solid("c")
+        robot.allow("foot", "c", allowed=False)
+        robot.allow("a", "b")
+        return robot
+
+    def answers(self, robot):
+        rng = np.random.default_rng(4)
+        rows, ends = rng.uniform(-1, 1, (2, 60, len(robot.joints)))
+        ends = rows + 0.1 * (ends - rows)
+        distance = robot.distance(rows)
+        return (
+            (robot.name, robot.joints, robot.links, robot.groups, robot.states, robot.pairs, robot.limits.tolist()),
+            robot.link_poses(rows).tolist(),
+            robot.pairs_in_contact(rows),
+            robot.pairs_inside(rows),
+            [np.asarray(of).tolist() for of in (distance.distance, distance.lower, distance.upper, distance.points)],
+            distance.bodies,
+            robot.is_free(rows, ends).tolist(),
+            [tuple(map(repr, robot.motion(*edge))) for edge in zip(rows[:10], ends)],
+        )
+
+    def test_copies_and_pickles_give_the_same_answers(self):
+        with tempfile.TemporaryDirectory() as above:
+            folder = pathlib.Path(above) / "robot"
+            folder.mkdir()
+            robot = self.changed(folder)
+            for file in folder.iterdir():
+                file.unlink()
+            expected = self.answers(robot)
+            self.assertTrue(5 < sum(map(bool, expected[2])) < 55)
+            once = pickle.loads(pickle.dumps(robot))
+            others = {
+                "copy": robot.copy(),
+                "copy.copy": copy.copy(robot),
+                "deepcopy": copy.deepcopy({"robot": [robot]})["robot"][0],
+                "pickle": once,
+                "pickle of a pickle": pickle.loads(pickle.dumps(once, protocol=2)),
+            }
+            for name, other in others.items():
+                with self.subTest(name):
+                    self.assertIsNot(other, robot)
+                    self.assertEqual(self.answers(other), expected)
+            # Each is a robot of its own, which can be changed as the first one can.
+            for other in others.values():
+                other.set_margin("c", 0)
+                other.set_pose("attached 1", np.eye(4))
+                other.remove("crate")
+            self.assertEqual(self.answers(robot), expected)
+            changed = [self.answers(other) for other in others.values()]
+            self.assertNotEqual(changed[0], expected)
+            self.assertTrue(all(answers == changed[0] for answers in changed))
+
+    def test_a_mesh_is_pickled_once_and_a_file_as_its_path(self):
+        with tempfile.TemporaryDirectory() as above:
+            robot = cbvh.Robot.from_urdf(URDF)
+            size = len(pickle.dumps(robot))
+            big = cbvh.bake(np.random.default_rng(1).normal(size=(3000, 3)), np.arange(3000).reshape(-1, 3))
+            for place in range(5):
+                robot.add_obstacle(big, shifts([place, 0, 0])[0], solid=False)
+            added = len(pickle.dumps(robot)) - size
+            self.assertTrue(big.nbytes < added < 1.2 * big.nbytes + 2000)
+            path = pathlib.Path(above) / "big.cbvh"
+            big.save(path)
+            robot.add_obstacle(cbvh.open(path), solid=False)
+            self.assertLess(len(pickle.dumps(robot)) - size - added, 2000)
+            # A mesh that two links have is there once.
+            for name in ("base", "link", "hand"):
+                (pathlib.Path(above) / f"{name}.obj").write_text((URDF.parent / f"{name}.obj").read_text())
+            text = URDF.read_text().replace('scale="0.8 0.8 0.8"', "").replace('scale="0.5 0.5 0.3"', "")
+            (pathlib.Path(above) / "twins.urdf").write_text(text)
+            twins = cbvh.Robot.from_urdf(pathlib.Path(above) / "twins.urdf")
+            self.assertLess(len(pickle.dumps(twins)), size - 2000)
+            self.assertEqual(self.answers_of(pickle.loads(pickle.dumps(twins))), self.answers_of(twins))
+
+    def answers_of(self, robot):
+        return robot.pairs_in_contact(random_rows(robot, 1, 30))
 
 
 class Misuse(unittest.TestCase):

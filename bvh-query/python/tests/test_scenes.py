@@ -575,6 +575,21 @@ class Sharing(unittest.TestCase):
         np.testing.assert_array_equal(one.contacts().triangles, other.contacts().triangles)
         self.assertEqual((one.parallel, one.tracking), (other.parallel, other.tracking))
 
+    def test_solid_instances_are_touched_by_what_is_inside(self):
+        shell, inner = cbvh.bake(*cube(4)), cbvh.bake(*cube(1))
+        for solid in (False, True):
+            scene = cbvh.Scene()
+            outer = scene.add(shell, solid=solid)
+            scene.add(inner)
+            self.assertIs(scene.collide(), solid)
+            self.assertIs(scene.mesh(outer).is_solid, solid)
+            self.assertIs(pickle.loads(pickle.dumps(scene)).collide(), solid)
+        vertices, faces = cube()
+        with self.assertRaises(ValueError) as caught:
+            scene.add(cbvh.bake(vertices, faces[1:]), solid=True)
+        self.assertIn("closed", str(caught.exception))
+        self.assertEqual(len(scene), 2)
+
     def test_copies_and_pickles_are_scenes_of_their_own(self):
         scene = self.scene()
         for other in (scene.copy(), copy.copy(scene), copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):

@@ -26,6 +26,9 @@ itself.
 
 **Scenes** are many placed meshes (`Scene`). `CollisionManager` has trimesh's interface for them.
 
+**Robots** are read from URDF files and asked about with the values of their joints (`Robot`). A body that starts inside a
+closed obstacle that is no solid does not touch it, and `InsideWarning` says so.
+
 **Answers** to one question are plain values. Answers to N questions are arrays of N elements or rows, or lists of N
 arrays if each question may have any number of results. Lengths are in mesh units. Contact and insides are decided
 exactly. Touching is contact, and meshes are surfaces, unless they are made solid.
@@ -78,7 +81,7 @@ from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._poses import nearest_pose, pose, relative
-from ._robot import Robot, RobotDistance, RobotMotion
+from ._robot import InsideWarning, Robot, RobotDistance, RobotMotion, _robot_of
 from ._scene import Scene, _scene_of
 from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
 from ._view import View
@@ -93,6 +96,7 @@ __all__ = [
     "ContactRegions",
     "Distance",
     "FormatError",
+    "InsideWarning",
     "Mesh",
     "Motion",
     "MotionAnswer",
@@ -143,6 +147,6 @@ __all__ = [
 ]
 
 # What is public belongs to this module, in pickles and in messages, whatever file it is in.
-for _thing in (*(globals()[name] for name in __all__ if name != "__version__"), _unpickle, _scene_of):
+for _thing in (*(globals()[name] for name in __all__ if name != "__version__"), _unpickle, _robot_of, _scene_of):
     _thing.__module__ = __name__
 del _thing

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import warnings
 from typing import Any, Iterable, Literal, Mapping, NamedTuple, Sequence
 
 import numpy as np
@@ -46,6 +48,10 @@ class RobotMotion(NamedTuple):
     """Their distance at that time."""
 
 
+class InsideWarning(UserWarning):
+    """A body starts inside a closed obstacle that is not solid, so that it does not touch it: see `Robot.add_obstacle`."""
+
+
 class Robot:
     """A robot among obstacles, asked about with the values of its joints.
 
@@ -56,7 +62,8 @@ class Robot:
     An array of joint values ``q`` has shape (n,) for one configuration, or (N, n) for N of them, in the order of `joints`.
     Angles are in radians, lengths in metres. Answers are certain, and the same bits on all systems. ``parallel=True`` divides
     N configurations among all cores. Threads may share a robot: a question is about the robot as it is when the question
-    begins.
+    begins. A robot can be copied and pickled. A pickle holds all of it: links, obstacles, attached objects, margins and allowed
+    pairs, and no file of the robot is read again. A mesh that was opened from a file is pickled as its path, like any `Mesh`.
 
     >>> robot = cbvh.Robot.from_urdf("panda.urdf", srdf="panda.srdf")       # doctest: +SKIP
     >>> robot.add_obstacle(cbvh.box([1, 1, 0.02]), name="table")            # doctest: +SKIP
@@ -64,16 +71,18 @@ class Robot:
     True
     """
 
-    __slots__ = ("_robot",)
+    __slots__ = ("_robot", "_unseen")
     _robot: _cbvh.Robot
+    # The surfaces among obstacles that no question has been asked about, which then warns of what is inside.
+    _unseen: frozenset[str]
 
     def __init__(self) -> None:
         raise TypeError("Robot: use Robot.from_urdf")
 
     @classmethod
-    def _of(cls, robot: _cbvh.Robot) -> Robot:
+    def _of(cls, robot: _cbvh.Robot, unseen: frozenset[str] = frozenset()) -> Robot:
         self = object.__new__(cls)
-        self._robot = robot
+        self._robot, self._unseen = robot, unseen
         return self
 
     @classmethod
@@ -119,7 +128,22 @@ class Robot:
 
     def copy(self) -> Robot:
         """A robot of its own with the same obstacles. It shares all meshes."""
-        return self._of(self._robot.copy())
+        return self._of(self._robot.copy(), self._unseen)
+
+    def __copy__(self) -> Robot:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Robot:
+        # Meshes never change.
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        texts, (cores, links), others, margins, allowed = self._robot.parts()
+        rows = [
+            (name, mesh.solid() if is_solid and not mesh.is_solid else mesh, link, np.reshape(pose, (4, 4)))
+            for name, mesh, is_solid, link, pose in others
+        ]
+        return (_robot_of, (texts, [Mesh(core) for core in cores], links, rows, margins, allowed, self._unseen))
 
     @property
     def name(self) -> str:
@@ -188,11 +212,44 @@ class Robot:
         found = self._robot.allow_frequent(int(samples), float(share))
         return [((a, b), part) for (a, b), part in found]
 
-    def add_obstacle(self, mesh: Mesh, pose: ArrayLike | None = None, name: str | None = None) -> str:
-        """Adds an obstacle: a mesh or a shape that stands in the world, at a pose of shape (4, 4). Returns its name."""
+    def add_obstacle(
+        self,
+        mesh: Mesh,
+        pose: ArrayLike | None = None,
+        name: str | None = None,
+        *,
+        solid: bool | None = None,
+    ) -> str:
+        """Adds an obstacle: a mesh or a shape that stands in the world, at a pose of shape (4, 4). Returns its name.
+
+        ``solid=True`` makes what is inside touch it, as `Mesh.solid` does; ValueError if the mesh is not closed. Otherwise a mesh
+        is its surface, and what is wholly inside does not touch it, as in a room. By default, `InsideWarning` tells of what is
+        inside: `collide`, `is_free` and `motion` look once for each obstacle, when they are first called after it was added, at
+        the first configuration that they are given. That takes as long as `pairs_inside`. ``solid=False`` says that the mesh is
+        meant as a shell, and nobody looks. Shapes such as `box` are solid anyway.
+        """
         name = self._free_name("obstacle") if name is None else name
-        self._robot.add_obstacle(name, mesh._mesh, pose)
+        mesh = mesh.solid() if solid else mesh
+        self._robot.add_obstacle(name, mesh._mesh, mesh, pose)
+        if solid is None and not mesh.is_solid:
+            self._unseen |= {name}
         return name
+
+    def _look_inside(self, rows: NDArray[np.float64]) -> None:
+        """Warns of what is inside obstacles that were added since the last call, in the first configuration."""
+        unseen, self._unseen = self._unseen, frozenset()
+        try:
+            found = self._robot.pairs_inside(rows[:1], False)[0]
+        except (ValueError, KeyError):
+            return  # Without an answer, there is nothing to warn of; `pairs_inside` says why.
+        for inner, outer in found:
+            if outer in unseen:
+                warnings.warn(
+                    f"{inner} is inside the surface of {outer}, which it does not touch; add {outer} with solid=True if it is"
+                    " full, or with solid=False if it is a shell",
+                    InsideWarning,
+                    stacklevel=_level_of_caller(),
+                )
 
     def attach(
         self,
@@ -201,10 +258,17 @@ class Robot:
         pose: ArrayLike | None = None,
         name: str | None = None,
         may_touch: Sequence[str] = (),
+        *,
+        solid: bool = False,
     ) -> str:
-        """Attaches a mesh to a link, at a pose in the link's frame. It may touch that link and those of ``may_touch``."""
+        """Attaches a mesh to a link, at a pose in the link's frame. It may touch that link and those of ``may_touch``.
+
+        The link's margin does not apply to what is attached, which has a margin of its own, 0 at first: see `set_margin`.
+        ``solid``: see `add_obstacle`.
+        """
         name = self._free_name("attached") if name is None else name
-        self._robot.attach(name, mesh._mesh, link, pose, list(may_touch))
+        mesh = mesh.solid() if solid else mesh
+        self._robot.attach(name, mesh._mesh, mesh, link, pose, list(may_touch))
         return name
 
     def _free_name(self, kind: str) -> str:
@@ -226,8 +290,14 @@ class Robot:
         self._robot.set_pose(name, pose)
 
     def set_margin(self, name: str, margin: float) -> None:
-        """Sets how near others may come to a body. Nearer counts as contact, and distances are less by it."""
+        """Sets how near others may come to a body: a link, an obstacle or an attached object. Nearer counts as contact, and
+        distances are less by it. The margin is that of this body alone: what is attached to a link does not get the link's."""
         self._robot.set_margin(name, float(margin))
+
+    def make_solid(self, name: str) -> None:
+        """Makes a body a solid: what is inside touches it from now on, also inside the mesh of a link. ValueError if its
+        mesh is not closed."""
+        self._robot.make_solid(name)
 
     def _rows(self, q: ArrayLike, name: str = "q") -> tuple[NDArray[np.float64], bool]:
         rows = np.ascontiguousarray(q, dtype=np.float64)
@@ -243,9 +313,12 @@ class Robot:
         return poses[0] if one else poses
 
     def collide(self, q: ArrayLike, *, parallel: bool = False) -> Any:
-        """Whether any two bodies touch: a bool, or an array of shape (N,)."""
+        """Whether any two bodies touch: a bool, or an array of shape (N,). What is inside a surface does not touch it: see
+        `pairs_inside`."""
         rows, one = self._rows(q)
         found = self._robot.collide(rows, parallel)
+        if self._unseen and len(rows):
+            self._look_inside(rows)
         return bool(found[0]) if one else found
 
     def pairs_in_contact(self, q: ArrayLike, *, parallel: bool = False) -> Any:
@@ -253,6 +326,44 @@ class Robot:
         rows, one = self._rows(q)
         found = [[(a, b) for a, b in pairs] for pairs in self._robot.pairs_in_contact(rows, parallel)]
         return found[0] if one else found
+
+    def pairs_inside(self, q: ArrayLike, *, parallel: bool = False) -> Any:
+        """The names of the bodies that are inside others without touching them, each with the body around it: a list of pairs,
+        or a list of N lists.
+
+        `collide` does not find them, and a motion within is free, because a mesh is its surface. If the outer body is meant to be
+        full, add it with ``solid=True``, or call `make_solid`. A body counts if a connected part of it is inside a mesh of the other
+        one. A mesh that is not closed has nothing inside. ValueError if a file was baked without topology.
+        """
+        rows, one = self._rows(q)
+        found = [[(inner, outer) for inner, outer in pairs] for pairs in self._robot.pairs_inside(rows, parallel)]
+        return found[0] if one else found
+
+    def nearest_turns(self, q0: ArrayLike, q1: ArrayLike) -> NDArray[np.float64]:
+        """The goal q1 with whole turns added or taken away, so that each joint that turns without limits goes the short way from
+        q0: by at most half a turn. The robot is in the same place, but for the rounding of the angle.
+
+        Motions are straight in joint values, so that a continuous joint from 3.0 to -3.0 goes 6 radians the long way round. MoveIt
+        and OMPL (``SO2StateSpace``) interpolate the short way:
+
+        >>> robot.is_free(start, robot.nearest_turns(start, goal))              # doctest: +SKIP
+        True
+
+        The values of continuous joints, of revolute ones without limits, and ``NAME/theta`` turn so. Other values stay as they are,
+        and so do those of joints which another joint mimics by sliding or by another multiple than a whole number. One row serves
+        all rows of the other argument. The shape is that of a configuration, or (N, n).
+        """
+        from_, to, one = self._ends(q0, q1)
+        nearest = self._robot.nearest_turns(from_, to).reshape(to.shape)
+        return nearest[0] if one else nearest
+
+    def _ends(self, q0: ArrayLike, q1: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
+        """The starts and ends of motions, and whether it is one motion alone."""
+        (from_, one), (to, other) = self._rows(q0, "q0"), self._rows(q1, "q1")
+        if len(from_) != len(to) and not (one or other):
+            raise ValueError(f"q1: expected {len(from_)} rows, as q0, found {len(to)}")
+        from_, to = np.broadcast_arrays(from_, to)
+        return np.ascontiguousarray(from_), np.ascontiguousarray(to), one and other
 
     def distance(self, q: ArrayLike, *, parallel: bool = False) -> RobotDistance:
         """The nearest two bodies, how far apart they are, and where; with arrays for N configurations."""
@@ -279,22 +390,21 @@ class Robot:
 
         False means that at some moment two bodies are within the clearance, or that their gap beyond it falls below the
         tolerance: a millionth of the size of the larger one, unless another one is given. A floating joint turns about one
-        axis, the shorter way. One row serves all rows of the other argument. A joint that turns by more than 16,384 radians is
-        refused with ValueError.
+        axis, the shorter way. Other joints turn by the difference of their values, however long that way is: a continuous joint
+        from 3.0 to -3.0 goes the long way round, unless q1 is what `nearest_turns` returns. A body that is inside a surface all the
+        way without touching it is free: see `pairs_inside`. One row serves all rows of the other argument. A joint that turns by more
+        than 16,384 radians is refused with ValueError.
         """
-        (from_, one), (to, other) = self._rows(q0, "q0"), self._rows(q1, "q1")
-        if len(from_) != len(to) and not (one or other):
-            raise ValueError(f"q1: expected {len(from_)} rows, as q0, found {len(to)}")
-        from_, to = np.broadcast_arrays(from_, to)
-        free = self._robot.is_free(
-            np.ascontiguousarray(from_), np.ascontiguousarray(to), float(clearance), tolerance, parallel
-        )
-        return bool(free[0]) if one and other else free
+        from_, to, one = self._ends(q0, q1)
+        free = self._robot.is_free(from_, to, float(clearance), tolerance, parallel)
+        if self._unseen and len(from_):
+            self._look_inside(from_)
+        return bool(free[0]) if one else free
 
     def motion(
         self, q0: ArrayLike, q1: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None
     ) -> RobotMotion:
-        """What touches first on the straight motion from q0 to q1, and when. See `is_free`."""
+        """What touches first on the straight motion from q0 to q1, and when. See `is_free`, also for the way round."""
         (from_, one), (to, other) = self._rows(q0, "q0"), self._rows(q1, "q1")
         if not (one and other):
             raise ValueError("q0 and q1: expected one configuration each, found several")
@@ -326,6 +436,8 @@ class Robot:
         if of.ndim != 2 or of.shape[0] != count or of.shape[1] == 0:
             raise ValueError(f"coefficients: expected shape ({count}, degree + 1), found {of.shape}")
         kind, free_until, at, joints, bodies, distance = self._robot.motion(of, float(clearance), tolerance)
+        if self._unseen:
+            self._look_inside(of[None, :, 0])
         is_free = kind == 0
         return RobotMotion(
             MotionKind(kind),
@@ -338,3 +450,26 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}: {len(self.joints)} joint values, {len(self.links)} links>"
+
+
+def _level_of_caller() -> int:
+    """The level of the first caller outside this file, for `warnings.warn`."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_code.co_filename == __file__ and frame.f_back is not None:
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+def _robot_of(
+    texts: tuple[tuple[str, str], tuple[str, str] | None, bool, str],
+    cores: list[Mesh],
+    links: list[tuple[int, float, bool]],
+    others: list[tuple[str, Mesh, str | None, Floats]],
+    margins: list[tuple[str, float]],
+    allowed: list[list[str]],
+    unseen: frozenset[str],
+) -> Robot:
+    """A robot as it was pickled."""
+    shapes = [(cores[number]._mesh, radius, is_solid) for number, radius, is_solid in links]
+    bodies = [(name, mesh._mesh, mesh, link, pose) for name, mesh, link, pose in others]
+    return Robot._of(_cbvh.Robot.of_parts(texts, shapes, bodies, margins, allowed), unseen)

@@ -135,15 +135,19 @@ class Scene:
         name: str | None = None,
         member: int = ALL_GROUPS,
         meets: int = ALL_GROUPS,
+        solid: bool = False,
     ) -> int:
         """Adds an instance, and returns its number.
 
         ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: a
         name that no other instance has. ``member`` are the groups that the instance is in, and ``meets`` those that it
         meets, one bit for each of 32. Questions are about two instances if each is in a group that the other meets.
+        ``solid`` makes what is inside touch the instance, as `Mesh.solid` does; ValueError if the mesh is not closed.
+        Without it, what is wholly inside a mesh does not touch it, and `relations` tells of it.
         """
         if not isinstance(mesh, Mesh):
             raise TypeError(f"mesh: expected a cbvh.Mesh, found {type(mesh).__name__}")
+        mesh = mesh.solid() if solid else mesh
         if name is not None and not isinstance(name, str):
             raise TypeError(f"name: expected a str or None, found {type(name).__name__}")
         groups = [_groups(member, "member"), _groups(meets, "meets")]
@@ -214,7 +218,8 @@ class Scene:
         return self._scene.allowed()
 
     def set_margin(self, id: int | str, margin: float) -> None:
-        """Gives an instance a margin in mesh units, which is added to the radius of its mesh in every question. 0 at first."""
+        """Gives an instance a margin in mesh units, which is added to the radius of its mesh in every question. 0 at first.
+        What is attached to the instance has a margin of its own."""
         self._scene.set_margin(self._number(id, "id"), _length(margin, "margin"))
 
     def margin(self, id: int | str) -> float:

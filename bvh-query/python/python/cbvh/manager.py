@@ -4,7 +4,7 @@
 It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
 
 - Meshes are surfaces, whether convex or not. A mesh that is inside another without touching it does not collide with
-  it, unless that is a primitive of trimesh, which is solid.
+  it, unless that is a primitive of trimesh, which is solid, or has ``solid=True``.
 - ``Sphere`` and ``Capsule`` of ``trimesh.primitives`` are exact, and have the one triangle 0. ``Box`` has the triangles of
   trimesh. ``Cylinder`` is a polyhedron around it, 0.002 of the radius larger, and not one inside it. An ``Extrusion`` is a
   mesh. Their transforms must be rigid. A primitive counts as it is when it is added or asked about.
@@ -22,7 +22,7 @@ It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
 - A primitive also touches what is all inside it. That contact has the number -1 in place of triangles.
 - `add_object` returns None, not an object of FCL.
 - If there is no pair of objects, a distance is infinite, and the names and the data are None.
-- A manager cannot be pickled or copied; a `Scene` can.
+- A manager can be pickled and copied. Its meshes are baked, so that nothing is baked again.
 """
 
 from __future__ import annotations
@@ -88,9 +88,11 @@ _recent: OrderedDict[bytes, _Geometry] = OrderedDict()
 _baking = threading.Lock()
 
 
-def _geometry(mesh: Any, radius: float = 0.0) -> _Geometry:
+def _geometry(mesh: Any, radius: float = 0.0, solid: bool = False) -> _Geometry:
     """A mesh as it is, or baked from its vertices and faces: each content once, as long as anybody holds it."""
     geometry = _of_radius_0(mesh)
+    if solid and not geometry.mesh.is_solid:
+        geometry = _Geometry(geometry.mesh.solid())
     if _length(radius, "radius") == 0:
         return geometry
     return _Geometry(geometry.mesh.rounded(geometry.mesh.radius + radius))
@@ -285,12 +287,22 @@ class CollisionManager:
         self._among_names: _Names = {}
         self._against_names: _Names = {}
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_manager_of, ([(name, geometry.mesh, pose) for name, geometry, pose in self._placed()],))
+
     def add_object(
-        self, name: Hashable, mesh: Any, transform: ArrayLike | None = None, *, radius: float = 0.0
+        self,
+        name: Hashable,
+        mesh: Any,
+        transform: ArrayLike | None = None,
+        *,
+        radius: float = 0.0,
+        solid: bool = False,
     ) -> None:
         """Adds an object. It replaces one of the same name. ``transform`` (body to world): None is the identity.
-        ``radius``: how much it is larger on all sides, in mesh units; that of the balls for a cloud of points."""
-        geometry, pose = _geometry(mesh, radius), _transform(transform)
+        ``radius``: how much it is larger on all sides, in mesh units; that of the balls for a cloud of points.
+        ``solid``: what is inside collides with it as well; ValueError if the mesh is not closed."""
+        geometry, pose = _geometry(mesh, radius, solid), _transform(transform)
         hash(name)  # Raises TypeError where it cannot be a name.
         with self._lock:
             among = self._among.add(geometry.mesh, pose)
@@ -324,13 +336,14 @@ class CollisionManager:
         return_data: bool = False,
         *,
         radius: float = 0.0,
+        solid: bool = False,
     ) -> Any:
         """Whether an object collides with any object of the manager.
 
         The answer is a bool. With ``return_names`` or ``return_data`` it is a tuple, which also has the set of names of
         the objects that it collides with, or a list of `ContactData`, in which the object is called ``"__external"``.
         """
-        others = [(EXTERNAL, _geometry(mesh, radius), _transform(transform))]
+        others = [(EXTERNAL, _geometry(mesh, radius, solid), _transform(transform))]
         found, pairs, data = self._collisions_with(others, return_names, return_data)
         return _asked(found, {own for own, _ in pairs}, data, return_names, return_data)
 
@@ -362,12 +375,13 @@ class CollisionManager:
         return_data: bool = False,
         *,
         radius: float = 0.0,
+        solid: bool = False,
     ) -> Any:
         """The least distance of an object from the manager's, in mesh units.
 
         With ``return_name``, the name of the closest follows, and with ``return_data`` a `DistanceData`.
         """
-        others = [(EXTERNAL, _geometry(mesh, radius), _transform(transform))]
+        others = [(EXTERNAL, _geometry(mesh, radius, solid), _transform(transform))]
         distance, names, data = self._distance_to(others)
         return _asked(distance, names and names[0], data, return_name, return_data)
 
@@ -472,6 +486,14 @@ class CollisionManager:
         points = [pose[:3, :3] @ point + pose[:3, 3] for point in (found.point_a, found.point_b)]
         rows = list(zip((int(found.triangle_a), int(found.triangle_b)), points))
         return distance, names, DistanceData(dict(zip(names, rows[::-1] if is_swapped else rows)), distance)
+
+
+def _manager_of(objects: list[tuple[Hashable, Mesh, Floats]]) -> CollisionManager:
+    """A manager as it was pickled or copied."""
+    manager = CollisionManager()
+    for name, mesh, pose in objects:
+        manager.add_object(name, mesh, pose)
+    return manager
 
 
 def _manager(manager: Any) -> CollisionManager:
