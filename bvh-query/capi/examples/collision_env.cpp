@@ -298,7 +298,7 @@ private:
 
     static void check(const cbvh::Robot &robot, const Prepared &prepared, CollisionResult &result,
                       const RobotState &from, const RobotState &to) {
-        const cbvh_robot_motion_answer answer = robot.motion(from.joints, to.joints);
+        const cbvh_robot_motion_answer answer = robot.motion(from.joints, robot.nearest_turns(from.joints, to.joints));
         if (answer.outcome == CBVH_FREE) {
             return;
         }

@@ -946,7 +946,8 @@ cbvh_status cbvh_scene_set_mesh(cbvh_scene scene, cbvh_instance instance, cbvh_m
  * the world is always that of the parent times the one that is kept, so that nothing adds up over many moves. To set the
  * pose of the child changes what is kept. On a motion, the child follows the path of its parent, unless it has a path of
  * its own. Permissions to touch do not change: a gripper usually touches what it holds, so allow this pair, and forbid
- * it again when it is detached. CBVH_INVALID_ARGUMENT if the parent is the child itself or moves with it. */
+ * it again when it is detached. Margins do not change either: the child has its own. CBVH_INVALID_ARGUMENT if the parent
+ * is the child itself or moves with it. */
 cbvh_status cbvh_scene_attach(cbvh_scene scene, cbvh_instance child, cbvh_instance parent);
 /* Detaches an instance from its parent, if it has one. It stays where it is. */
 cbvh_status cbvh_scene_detach(cbvh_scene scene, cbvh_instance child);
@@ -1181,10 +1182,13 @@ cbvh_status cbvh_robot_shape(cbvh_robot robot, cbvh_body body, size_t number, cb
 cbvh_status cbvh_robot_pairs(cbvh_robot robot, cbvh_body_pair *pairs, size_t capacity, size_t *count);
 
 /* Adds an obstacle, which stands in the world. No other body may have its name. `body` may be NULL. The handle of the
- * mesh may be freed afterwards. */
+ * mesh may be freed afterwards. A mesh is its surface, and what is wholly inside does not touch it, so that a room may
+ * stand around the robot. If what is inside counts, pass a solid mesh (cbvh_mesh_solid), or call cbvh_robot_make_solid.
+ * cbvh_robot_pairs_inside tells which bodies are inside others. */
 cbvh_status cbvh_robot_add_obstacle(cbvh_robot robot, const char *name, cbvh_mesh mesh, const cbvh_pose *pose,
                                     cbvh_body *body);
-/* Attaches an object to a link, at a pose in the link's frame. It may touch that link and those of `may_touch`. */
+/* Attaches an object to a link, at a pose in the link's frame. It may touch that link and those of `may_touch`. The
+ * link's margin does not apply to it: it has a margin of its own, 0 at first (cbvh_robot_set_margin). */
 cbvh_status cbvh_robot_attach(cbvh_robot robot, const char *name, cbvh_mesh mesh, const char *link,
                               const cbvh_pose *pose, const char *const *may_touch, size_t may_touch_count,
                               cbvh_body *body);
@@ -1192,8 +1196,13 @@ cbvh_status cbvh_robot_attach(cbvh_robot robot, const char *name, cbvh_mesh mesh
 cbvh_status cbvh_robot_remove(cbvh_robot robot, const char *name);
 /* Moves an obstacle, or an attached object in the frame of its link. CBVH_NOT_FOUND for a link. */
 cbvh_status cbvh_robot_set_pose(cbvh_robot robot, const char *name, const cbvh_pose *pose);
-/* Gives a body a margin of at least 0, which is added to the radii of its shapes in every question. It is 0 at first. */
+/* Gives a body, a link, an obstacle or an attached object, a margin of at least 0, which is added to the radii of its
+ * shapes in every question. It is 0 at first, and that of this body alone: what is attached to a link does not get the
+ * link's. */
 cbvh_status cbvh_robot_set_margin(cbvh_robot robot, const char *name, double margin);
+/* Makes a body a solid, also a link: what is inside touches it from now on. CBVH_INVALID_ARGUMENT if a mesh of the body is
+ * not closed: see cbvh_mesh_solid. */
+cbvh_status cbvh_robot_make_solid(cbvh_robot robot, const char *name);
 /* Allows two bodies to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
 cbvh_status cbvh_robot_set_allowed(cbvh_robot robot, const char *a, const char *b, int32_t allowed);
 
@@ -1230,6 +1239,12 @@ cbvh_status cbvh_robot_distances(cbvh_robot robot, const double *joints, size_t 
 /* Lists the pairs that touch, configuration after configuration. `counts` gets the number of each, and may be NULL. */
 cbvh_status cbvh_robot_pairs_in_contact(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                         size_t *counts, cbvh_body_pair *pairs, size_t capacity, size_t *pair_count);
+/* Lists the bodies that are inside others without touching them, each as `a` with the body around it as `b`, configuration
+ * after configuration. Other questions do not find them, because a mesh is its surface. A body counts if a connected part
+ * of it is inside a mesh of the other one. A mesh that is not closed has nothing inside. CBVH_INVALID_ARGUMENT if a file in
+ * question was baked without topology. */
+cbvh_status cbvh_robot_pairs_inside(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
+                                    size_t *counts, cbvh_body_pair *pairs, size_t capacity, size_t *pair_count);
 
 /* Whether a motion of a robot is free, and where it ends. */
 typedef struct cbvh_robot_motion_answer {
@@ -1245,8 +1260,17 @@ typedef struct cbvh_robot_motion_answer {
     cbvh_distance_answer nearest;
 } cbvh_robot_motion_answer;
 
+/* Writes each end with whole turns added or taken away, so that each joint that turns without limits goes the short way
+ * from the start: by at most half a turn. The robot is in the same place, but for the rounding of the angle. MoveIt and
+ * OMPL interpolate so. The values of continuous joints, of revolute ones without limits and NAME/theta turn so. Other
+ * values stay as they are, and so do those of joints that another one mimics by sliding or by another multiple than a whole
+ * number. `nearest` gets count * joint_count numbers, and may be `ends`. */
+cbvh_status cbvh_robot_nearest_turns(cbvh_robot robot, const double *starts, const double *ends, size_t joint_count,
+                                     size_t count, double *nearest);
 /* Answers whether each motion from a start to an end is certainly free, at every moment. Each joint moves at a constant
- * rate, and a floating one turns about one axis, the shorter way. A path through `n` configurations is `n - 1` motions:
+ * rate, and a floating one turns about one axis, the shorter way. Other joints turn by the difference of their values: a
+ * continuous joint from 3.0 to -3.0 goes the long way round, unless cbvh_robot_nearest_turns made the end. A body that is
+ * inside a surface all the way without touching it is free: see cbvh_robot_pairs_inside. A path through `n` configurations is `n - 1` motions:
  * pass it for the starts, and its second configuration for the ends. Turns by more than 16,384 radians are refused. */
 cbvh_status cbvh_robot_edges_are_free(cbvh_robot robot, const double *starts, const double *ends, size_t joint_count,
                                       size_t count, const cbvh_motion_options *options, bool *answers);

@@ -1096,8 +1096,11 @@ public:
         return stats;
     }
 
-    /// Places a mesh in the world; a name that is empty is none.
-    Instance add(const Mesh &mesh, const Pose &world, const std::string &name = {}) {
+    /// Places a mesh in the world; a name that is empty is none. If it is solid, what is inside touches it: see Mesh::solid.
+    Instance add(const Mesh &mesh, const Pose &world, const std::string &name = {}, bool solid = false) {
+        if (solid) {
+            return add(mesh.solid(), world, name);
+        }
         Instance instance{0};
         const char *raw_name = name.empty() ? nullptr : detail::c_text("name", name);
         check(cbvh_scene_add(raw(), mesh.raw(), &world, raw_name, &instance));
@@ -1495,15 +1498,23 @@ public:
         });
     }
 
-    /// Adds an obstacle at a pose in the world.
-    Body add_obstacle(const std::string &name, const Mesh &mesh, const Pose &pose = {}) {
+    /// Adds an obstacle at a pose in the world. A mesh is its surface, and what is wholly inside does not touch it, unless it is
+    /// solid: see Mesh::solid and pairs_inside.
+    Body add_obstacle(const std::string &name, const Mesh &mesh, const Pose &pose = {}, bool solid = false) {
+        if (solid) {
+            return add_obstacle(name, mesh.solid(), pose);
+        }
         Body body{0};
         check(cbvh_robot_add_obstacle(raw(), detail::c_text("name", name), mesh.raw(), &pose, &body));
         return body;
     }
-    /// Attaches an object to a link, at a pose in the link's frame. It may touch that link and the given ones.
+    /// Attaches an object to a link, at a pose in the link's frame. It may touch that link and the given ones. The link's
+    /// margin does not apply to it: see set_margin.
     Body attach(const std::string &name, const Mesh &mesh, const std::string &link, const Pose &pose = {},
-                const std::vector<std::string> &may_touch = {}) {
+                const std::vector<std::string> &may_touch = {}, bool solid = false) {
+        if (solid) {
+            return attach(name, mesh.solid(), link, pose, may_touch);
+        }
         Body body{0};
         const auto touched = texts("may_touch", may_touch);
         check(cbvh_robot_attach(raw(), detail::c_text("name", name), mesh.raw(), detail::c_text("link", link), &pose,
@@ -1514,9 +1525,12 @@ public:
     void set_pose(const std::string &name, const Pose &pose) {
         check(cbvh_robot_set_pose(raw(), detail::c_text("name", name), &pose));
     }
+    /// Sets the margin of one body. What is attached to a link does not get the link's.
     void set_margin(const std::string &name, double margin) {
         check(cbvh_robot_set_margin(raw(), detail::c_text("name", name), margin));
     }
+    /// Makes a body a solid: what is inside touches it from now on. Throws unless its meshes are closed.
+    void make_solid(const std::string &name) { check(cbvh_robot_make_solid(raw(), detail::c_text("name", name))); }
     void set_allowed(const std::string &a, const std::string &b, bool allowed) {
         check(cbvh_robot_set_allowed(raw(), detail::c_text("a", a), detail::c_text("b", b), allowed));
     }
@@ -1582,7 +1596,41 @@ public:
             });
     }
 
-    /// Whether the straight motion from a start to an end is certainly free, at every moment.
+    /// The bodies that are inside others without touching them, each as `a` with the body around it as `b`: see
+    /// cbvh_robot_pairs_inside.
+    std::vector<cbvh_body_pair> pairs_inside(const Joints &joints) const {
+        return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+            return cbvh_robot_pairs_inside(raw(), joints.data(), joints.size(), 1, nullptr, pairs, capacity, count);
+        });
+    }
+    std::vector<std::vector<cbvh_body_pair>> pairs_inside(const std::vector<Joints> &joints) {
+        const Rows rows("joints", joints);
+        return detail::lists<cbvh_body_pair>(
+            room_, rows.count,
+            [&](std::size_t *each, cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return cbvh_robot_pairs_inside(raw(), rows.data(), width(rows), rows.count, each, pairs, capacity,
+                                               count);
+            });
+    }
+
+    /// The end to which joints that turn without limits go the short way: see cbvh_robot_nearest_turns.
+    Joints nearest_turns(const Joints &start, const Joints &end) const { return nearest_turns({start}, {end})[0]; }
+    std::vector<Joints> nearest_turns(const std::vector<Joints> &starts, const std::vector<Joints> &ends) const {
+        const Rows from("starts", starts), to("ends", ends, starts);
+        std::vector<double> nearest(to.numbers.size());
+        check(cbvh_robot_nearest_turns(raw(), from.data(), to.data(), width(from), from.count, nearest.data()));
+        std::vector<Joints> rows = ends;
+        auto next = nearest.begin();
+        for (Joints &row : rows) {
+            const auto end = next + static_cast<std::ptrdiff_t>(row.size());
+            row.assign(next, end);
+            next = end;
+        }
+        return rows;
+    }
+
+    /// Whether the straight motion from a start to an end is certainly free, at every moment. Joints turn by the difference of
+    /// their values, the long way round if that is long: see nearest_turns.
     bool is_free(const Joints &start, const Joints &end, const MotionOptions &options = {}) const {
         return edges_are_free({start}, {end}, options)[0];
     }

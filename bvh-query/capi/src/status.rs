@@ -96,7 +96,9 @@ fn of_robot(error: &RobotError) -> Status {
         RobotError::Mesh { source, .. } => of_bake(source),
         RobotError::Cache { source } => of_open(source),
         RobotError::Unknown { .. } => Status::NotFound,
-        RobotError::Query(source) | RobotError::Pair { source, .. } => of_query(source),
+        RobotError::Query(source) | RobotError::Pair { source, .. } | RobotError::NotSolid { source, .. } => {
+            of_query(source)
+        }
         _ => Status::InvalidArgument,
     }
 }

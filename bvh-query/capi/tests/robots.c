@@ -412,6 +412,124 @@ static void changes(void) {
     OK(cbvh_robot_free(plain));
 }
 
+/* A robot in a room is told apart from a free one, and collides with the room if that is solid. */
+static void insides(int32_t parallel) {
+    const cbvh_robot robot = arm();
+    const char *const links[LINKS] = {"base", "turret", "upper_arm", "forearm", "hand"};
+    const cbvh_mesh room = cube(9), pea = cube(0.002);
+    const cbvh_pose here = CBVH_IDENTITY, there = shift(30, 0, 0);
+    cbvh_body outer, inner, bodies[LINKS];
+    cbvh_body_pair pairs[3 * LINKS];
+    double joints[3 * JOINTS] = {0};
+    size_t count, counts[3];
+    bool touching[3], is_free[3];
+    OK(cbvh_robot_set_parallel(robot, parallel));
+    OK(cbvh_robot_links(robot, bodies, LINKS, &count));
+    OK(cbvh_robot_pairs_inside(robot, joints, JOINTS, 3, counts, NULL, 0, &count));
+    CHECK(count == 0 && counts[0] == 0 && counts[2] == 0);
+    OK(cbvh_robot_add_obstacle(robot, "room", room, &here, &outer));
+    OK(cbvh_robot_collide(robot, joints, JOINTS, 3, touching));
+    OK(cbvh_robot_edges_are_free(robot, joints, joints, JOINTS, 3, NULL, is_free));
+    CHECK(!touching[0] && is_free[0] && !touching[2] && is_free[2]);
+    OK(cbvh_robot_pairs_inside(robot, joints, JOINTS, 3, counts, pairs, 3 * LINKS, &count));
+    CHECK(count == 3 * LINKS && counts[1] == LINKS);
+    for (size_t k = 0; k < count; k++) {
+        CHECK(pairs[k].a.id == bodies[k % LINKS].id && pairs[k].b.id == outer.id);
+    }
+    FAILS(cbvh_robot_pairs_inside(robot, joints, JOINTS, 1, NULL, pairs, 2, &count), CBVH_BUFFER_TOO_SMALL, "pairs: expected room");
+    CHECK(count == LINKS);
+    OK(cbvh_robot_set_pose(robot, "room", &there));
+    OK(cbvh_robot_pairs_inside(robot, joints, JOINTS, 1, NULL, pairs, 2, &count));
+    CHECK(count == 0);
+    OK(cbvh_robot_set_pose(robot, "room", &here));
+    OK(cbvh_robot_make_solid(robot, "room"));
+    OK(cbvh_robot_collide(robot, joints, JOINTS, 3, touching));
+    OK(cbvh_robot_pairs_inside(robot, joints, JOINTS, 3, NULL, NULL, 0, &count));
+    CHECK(touching[0] && touching[2] && count == 0);
+    OK(cbvh_robot_remove(robot, "room"));
+    /* What is inside a link. */
+    const cbvh_pose in_link = shift(0, 0, 0.4);
+    OK(cbvh_robot_add_obstacle(robot, "pea", pea, &in_link, &inner));
+    OK(cbvh_robot_pairs_inside(robot, joints, JOINTS, 1, NULL, pairs, 2, &count));
+    CHECK(count == 1 && pairs[0].a.id == inner.id && pairs[0].b.id == bodies[2].id);
+    OK(cbvh_robot_make_solid(robot, "upper_arm"));
+    OK(cbvh_robot_collide(robot, joints, JOINTS, 1, touching));
+    CHECK(touching[0]);
+    FAILS(cbvh_robot_make_solid(robot, "nothing"), CBVH_NOT_FOUND, "found 'nothing'");
+    FAILS(cbvh_robot_make_solid(robot, NULL), CBVH_INVALID_ARGUMENT, "name: ");
+    OK(cbvh_robot_remove(robot, "pea"));
+    const double corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    const uint32_t face[3] = {0, 1, 2};
+    cbvh_mesh sheet;
+    OK(cbvh_bake(corners, 3, face, 1, NULL, &sheet));
+    OK(cbvh_robot_add_obstacle(robot, "sheet", sheet, &there, NULL));
+    FAILS(cbvh_robot_make_solid(robot, "sheet"), CBVH_INVALID_ARGUMENT, "sheet: expected closed objects");
+    OK(cbvh_robot_remove(robot, "sheet"));
+    OK(cbvh_mesh_free(sheet));
+    OK(cbvh_mesh_free(room));
+    OK(cbvh_mesh_free(pea));
+    /* The margin of a link is not that of what it carries. */
+    const cbvh_mesh tool = block(0.02, 0.02, 0.2), lamp = block(0.1, 0.1, 0.1);
+    const cbvh_pose in_hand = shift(0, 0, 0.2);
+    cbvh_robot_distance_answer near;
+    OK(cbvh_robot_attach(robot, "tool", tool, "hand", &in_hand, links, LINKS, NULL));
+    for (int a = 0; a < LINKS; a++) {
+        for (int b = 0; b < a; b++) {
+            OK(cbvh_robot_set_allowed(robot, links[a], links[b], 1));
+        }
+    }
+    add(robot, "lamp", lamp, 0, 0, 1.5);
+    OK(cbvh_robot_distances(robot, joints, JOINTS, 1, &near));
+    const double gap = near.nearest.distance;
+    CHECK(gap > 0.1);
+    OK(cbvh_robot_set_margin(robot, "hand", 0.01));
+    OK(cbvh_robot_distances(robot, joints, JOINTS, 1, &near));
+    CHECK(near.nearest.distance == gap);
+    OK(cbvh_robot_set_margin(robot, "tool", 0.01));
+    OK(cbvh_robot_distances(robot, joints, JOINTS, 1, &near));
+    CHECK(fabs(near.nearest.distance - (gap - 0.01)) < 1e-12);
+    OK(cbvh_mesh_free(tool));
+    OK(cbvh_mesh_free(lamp));
+    OK(cbvh_robot_free(robot));
+}
+
+/* A continuous joint goes the short way to the end that is nearest, and a joint with limits stays. */
+static void turns(void) {
+    char path[1000];
+    snprintf(path, sizeof path, "%s", in(scratch, "turning.urdf"));
+    write_file(path, "<robot name=\"r\"><link name=\"root\"/><link name=\"arm\"><collision><origin xyz=\"1 0 0\"/>"
+        "<geometry><sphere radius=\"0.1\"/></geometry></collision></link><link name=\"b\"/>"
+        "<joint name=\"turn\" type=\"continuous\"><parent link=\"root\"/><child link=\"arm\"/><axis xyz=\"0 0 1\"/></joint>"
+        "<joint name=\"limited\" type=\"revolute\"><parent link=\"root\"/><child link=\"b\"/>"
+        "<limit lower=\"-6.3\" upper=\"6.3\" effort=\"1\" velocity=\"1\"/></joint></robot>");
+    cbvh_robot robot;
+    OK(cbvh_robot_from_urdf(path, NULL, &robot));
+    const cbvh_mesh ball = block(0.3, 0.3, 0.3);
+    add(robot, "ball", ball, 1, 0, 0);
+    const double starts[4] = {3, 3, 1, 1}, ends[4] = {-3, -3, 1.5, -5};
+    double nearest[4];
+    bool is_free[2];
+    OK(cbvh_robot_nearest_turns(robot, starts, ends, 2, 2, nearest));
+    CHECK(fabs(nearest[0] - 3.2831853) < 1e-6 && nearest[1] == -3 && nearest[2] == 1.5 && nearest[3] == -5);
+    OK(cbvh_robot_edges_are_free(robot, starts, ends, 2, 1, NULL, is_free));
+    OK(cbvh_robot_edges_are_free(robot, starts, nearest, 2, 1, NULL, is_free + 1));
+    CHECK(!is_free[0] && is_free[1]);
+    /* In place, and none at all. */
+    double same[4] = {-3, -3, 1.5, -5};
+    OK(cbvh_robot_nearest_turns(robot, starts, same, 2, 2, same));
+    CHECK(memcmp(same, nearest, sizeof same) == 0);
+    OK(cbvh_robot_nearest_turns(robot, NULL, NULL, 2, 0, NULL));
+    FAILS(cbvh_robot_nearest_turns(robot, starts, ends, 2, 2, NULL), CBVH_INVALID_ARGUMENT, "nearest: expected a pointer");
+    FAILS(cbvh_robot_nearest_turns(robot, NULL, ends, 2, 2, nearest), CBVH_INVALID_ARGUMENT, "starts: expected a pointer");
+    FAILS(cbvh_robot_nearest_turns(robot, starts, ends, 3, 1, nearest), CBVH_INVALID_ARGUMENT, "joint_count: expected 2");
+    same[2] = NAN;
+    FAILS(cbvh_robot_nearest_turns(robot, starts, same, 2, 2, nearest), CBVH_INVALID_ARGUMENT, "ends[1]: joint turn: expected a finite");
+    same[2] = 2e9;
+    FAILS(cbvh_robot_nearest_turns(robot, starts, same, 2, 2, nearest), CBVH_INVALID_ARGUMENT, "ends[1]: joint turn: expected an angle within");
+    OK(cbvh_mesh_free(ball));
+    OK(cbvh_robot_free(robot));
+}
+
 /* Bytes of the caller are released when no robot uses them any more. */
 static void release(void *user) { ++*(int *)user; }
 
@@ -638,7 +756,9 @@ int main(int count, char **arguments) {
     for (int32_t parallel = 0; parallel < 2; parallel++) {
         configurations(parallel);
         motions(parallel);
+        insides(parallel);
     }
+    turns();
     changes();
     lets_go();
     misuse();

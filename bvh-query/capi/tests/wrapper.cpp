@@ -451,6 +451,29 @@ void robots(const std::string &urdf) {
     CHECK(robot.motion(line).at == robot.motion(up, forward).at && !robot.is_free(line) && robot.is_free(back));
     robot.set_pose("box", cbvh::Pose::translation(3, 0, 0));
     CHECK(!robot.collide(forward));
+    // A room around the robot, as a surface and as a solid.
+    const cbvh::Mesh wide = cbvh::Mesh::box({20, 20, 20});
+    cbvh::Robot inside = robot;
+    const cbvh::Body room = inside.add_obstacle("room", wide);
+    const auto found = inside.pairs_inside(up);
+    CHECK(!inside.collide(up) && found.size() == 6 && found[0].b == room && inside.name(found[0].a) == "base");
+    CHECK(inside.pairs_inside(both)[1].size() == 6 && robot.pairs_inside(up).empty());
+    inside.make_solid("room");
+    CHECK(inside.collide(up) && inside.pairs_inside(up).empty() && !robot.find("room"));
+    inside.remove("room");
+    inside.add_obstacle("room", wide, {}, true);
+    CHECK(inside.collide(up));
+    inside.remove("room");
+    inside.attach("shell", wide, "hand", {}, {}, true);
+    CHECK(inside.collide(up));
+    // A joint with limits goes straight.
+    CHECK(robot.nearest_turns({3, 0, 0, 0}, {-3, 0, 0, 0}) == Joints({-3, 0, 0, 0}));
+    CHECK(robot.nearest_turns(both, {forward, up}) == std::vector<Joints>({forward, up}));
+    FAILS(robot.nearest_turns(both, {up}), CBVH_INVALID_ARGUMENT, "ends: expected as many ends as starts");
+    cbvh::Scene scene;
+    scene.add(wide, {}, "wide", true);
+    scene.add(block, {});
+    CHECK(scene.collide());
     robot.set_margin("box", 3);
     CHECK(robot.collide(forward) && robot.shapes(box)[0].first.radius() == 3);
     robot.remove("box");

@@ -280,6 +280,12 @@ pub unsafe extern "C" fn cbvh_robot_set_margin(robot: RobotHandle, name: *const 
 }
 
 #[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_robot_make_solid(robot: RobotHandle, name: *const c_char) -> i32 {
+    // SAFETY: the header asks for it.
+    see(robot, |robot| unsafe { Ok(robot.make_solid(text("name", name)?)?) })
+}
+
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_robot_set_allowed(
     robot: RobotHandle,
     a: *const c_char,

@@ -142,6 +142,37 @@ fn distance(robot: &Robot, of: Option<RobotDistance>) -> RobotDistanceRow {
     RobotDistanceRow { pair: numbered(robot, &bodies), nearest: nearest.into(), found: 1, reserved: 0 }
 }
 
+/// Room for a list of pairs of bodies for each configuration.
+struct Pairs {
+    counts: *mut usize,
+    pairs: *mut BodyPairRow,
+    capacity: usize,
+    count: *mut usize,
+}
+
+impl Configurations {
+    /// Lists pairs of bodies for each configuration.
+    ///
+    /// # Safety
+    /// As for `array` and `Lists::new`.
+    unsafe fn pairs(
+        &self,
+        to: Pairs,
+        one: impl Fn(&mut Robot, &[f64]) -> Result<Vec<[String; 2]>, RobotError>,
+        all: impl FnOnce(&mut Robot, &[f64]) -> Result<Vec<Vec<[String; 2]>>, RobotError>,
+    ) -> i32 {
+        let Pairs { counts, pairs, capacity, count } = to;
+        // SAFETY: the caller vouches for it.
+        entry(|| unsafe {
+            let room = || Lists::new(("pairs", pairs, capacity, count), counts, self.1.count);
+            self.ask(room, one, all, |lists, own, found| {
+                let rows = |pairs: &Vec<_>| Ok(pairs.iter().map(|pair| numbered(own, pair)).collect());
+                lists.finish_with::<BodyPairRow, Failure>(found.iter().map(rows))
+            })
+        })
+    }
+}
+
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_robot_pairs_in_contact(
     robot: RobotHandle,
@@ -153,18 +184,37 @@ pub unsafe extern "C" fn cbvh_robot_pairs_in_contact(
     capacity: usize,
     pair_count: *mut usize,
 ) -> i32 {
+    let to = Pairs { counts, pairs, capacity, count: pair_count };
     // SAFETY: the header asks for it.
-    entry(|| unsafe {
-        configurations(robot, joints, joint_count, count).ask(
-            || Lists::new(("pairs", pairs, capacity, pair_count), counts, count),
+    unsafe {
+        configurations(robot, joints, joint_count, count).pairs(
+            to,
             |robot, joints| robot.pairs_in_contact(joints),
             |robot, joints| robot.pairs_in_contact_many(joints),
-            |lists, own, found| {
-                let rows = |pairs: &Vec<_>| Ok(pairs.iter().map(|pair| numbered(own, pair)).collect());
-                lists.finish_with::<BodyPairRow, Failure>(found.iter().map(rows))
-            },
         )
-    })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_robot_pairs_inside(
+    robot: RobotHandle,
+    joints: *const f64,
+    joint_count: usize,
+    count: usize,
+    counts: *mut usize,
+    pairs: *mut BodyPairRow,
+    capacity: usize,
+    pair_count: *mut usize,
+) -> i32 {
+    let to = Pairs { counts, pairs, capacity, count: pair_count };
+    // SAFETY: the header asks for it.
+    unsafe {
+        configurations(robot, joints, joint_count, count).pairs(
+            to,
+            |robot, joints| robot.pairs_inside(joints),
+            |robot, joints| robot.pairs_inside_many(joints),
+        )
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -238,6 +288,32 @@ unsafe fn straight(robot: &Robot, starts: &Rows, ends: &Rows) -> Result<Vec<Edge
         edges.push(Edge::straight(from, to).map_err(starts.at(row))?);
     }
     Ok(edges)
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_robot_nearest_turns(
+    robot: RobotHandle,
+    starts: *const f64,
+    ends: *const f64,
+    joint_count: usize,
+    count: usize,
+    nearest: *mut f64,
+) -> i32 {
+    let rows = |name, numbers| Rows { name, numbers, joints: joint_count, per_joint: 1, count };
+    let (starts, ends) = (rows("starts", starts), rows("ends", ends));
+    let turned = |own: &mut Robot, _| {
+        // SAFETY: the header asks for it. The numbers are copied before any is written.
+        let (from, to, mut room) = unsafe {
+            let (from, to) = (starts.configurations(own)?, ends.configurations(own)?);
+            (from, to, Room::new("nearest", nearest, joint_count * count)?)
+        };
+        for (row, (from, to)) in starts.of(&from).zip(ends.of(&to)).enumerate() {
+            let turned = own.nearest_turns(from, to).map_err(ends.at(row))?;
+            (0..).zip(turned).for_each(|(number, value)| room.set(row * joint_count + number, value));
+        }
+        Ok(())
+    };
+    entry(|| ask(robot, turned))
 }
 
 /// Makes motions on which each joint value follows a polynomial.
