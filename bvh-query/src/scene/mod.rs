@@ -366,7 +366,7 @@ impl Scene {
     }
 
     /// Gives an instance a margin in mesh units, which is added to the radius of its shape in every question. It is 0 at
-    /// first.
+    /// first. What is attached to the instance has a margin of its own.
     ///
     /// # Errors
     /// [`InstanceError::NoInstance`], or [`InstanceError::Margin`] for a margin that is negative, NaN or above 2^118.
