@@ -91,6 +91,22 @@ fn the_template_has_one_line_for_the_content() {
 }
 
 #[test]
+fn only_the_code_of_the_template_may_run() {
+    let (_, rest) = TEMPLATE.split_once("<meta http-equiv=\"Content-Security-Policy\" content=\"").unwrap();
+    let policy: Vec<&str> = rest.split_once("\">").unwrap().0.split("; ").collect();
+    assert_eq!(policy[0], "default-src 'none'");
+    // The code that unpacks, and what it unpacks. The tests of the viewer compare the hashes.
+    let code = policy.iter().find_map(|rule| rule.strip_prefix("script-src 'wasm-unsafe-eval' ")).unwrap();
+    assert!(
+        code.split(' ').all(|hash| hash.starts_with("'sha256-")) && code.split(' ').count() == 2,
+        "{code}"
+    );
+    assert!(!policy.iter().any(|rule| rule.contains("unsafe-inline") || rule.contains("http")));
+    // The policy holds for what stands after it.
+    assert!(rest.contains("<style>") && rest.contains("<!--cbvh:content-->"));
+}
+
+#[test]
 fn what_was_put_in_comes_out() {
     let (a, b) = (block(), bake(&shapes::point([0.1, 0.2, 0.3])));
     let pose =
