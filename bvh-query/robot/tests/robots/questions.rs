@@ -121,13 +121,30 @@ fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
     }
 }
 
+/// Returns the joint values at a time of a straight motion. A floating base turns at a constant rate, the shorter way.
+fn between(base: Base, from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
+    let mut q: Vec<f64> = from.iter().zip(to).map(|(from, to)| from + t * (to - from)).collect();
+    if base == Base::Floating {
+        let unit = |of: &[f64]| {
+            let length = of[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
+            [3, 4, 5, 6].map(|k| of[k] / length)
+        };
+        let (from, to) = (unit(from), unit(to));
+        let cosine = from.iter().zip(to).map(|(x, y)| x * y).sum::<f64>();
+        let angle = cosine.abs().min(1.0).acos();
+        let [of_from, of_to] = [(1.0 - t) * angle, t * angle].map(|share| share.sin() / angle.sin());
+        q[3..7].copy_from_slice(&[0, 1, 2, 3].map(|k| of_from * from[k] + cosine.signum() * of_to * to[k]));
+    }
+    q
+}
+
 /// No sample of a free motion touches, and every hit is one.
 #[test]
 fn free_motions_are_free_at_all_samples() {
     for (base, seed) in [(Base::Fixed, 2), (Base::Planar, 3), (Base::Floating, 4)] {
         let mut robot = cell(base);
         let random = &mut Random::new(seed);
-        let (mut free, mut hit) = (0, 0);
+        let (mut free, mut hit, mut samples) = (0, 0, 0);
         for _ in 0..40 {
             let [mut from, mut to] = [(); 2].map(|()| random_values(random, &robot));
             if base == Base::Floating {
@@ -139,11 +156,10 @@ fn free_motions_are_free_at_all_samples() {
             to = from.iter().zip(&to).map(|(from, to)| from + share * (to - from)).collect();
             let edge = Edge::straight(&from, &to).unwrap();
             let is_free = robot.is_free(&from, &to).unwrap();
-            let samples = if base == Base::Floating { 0 } else { 500 };
-            for step in 0..samples {
-                let t = f64::from(step) / 500.0;
-                let q: Vec<f64> = from.iter().zip(&to).map(|(from, to)| from + t * (to - from)).collect();
-                assert!(!is_free || !robot.collide(&q).unwrap());
+            for step in 0..if is_free { 500 } else { 0 } {
+                let q = between(base, &from, &to, f64::from(step) / 500.0);
+                assert!(!robot.collide(&q).unwrap(), "{base:?}: {q:?}");
+                samples += 1;
             }
             match robot.motion(&edge, &MotionOptions::new()).unwrap() {
                 RobotMotion::Free => assert!(is_free),
@@ -153,17 +169,19 @@ fn free_motions_are_free_at_all_samples() {
                     let way: f64 = (0..3).map(|k| (points[0][k] - points[1][k]).powi(2)).sum();
                     assert!((way.sqrt() - nearest.distance).abs() < 1e-9);
                     for step in 0..if free_until > 0.0 { 50 } else { 0 } {
-                        let t = free_until * f64::from(step) / 50.0;
-                        let q: Vec<f64> =
-                            from.iter().zip(&to).map(|(from, to)| from + t * (to - from)).collect();
-                        assert!(samples == 0 || !robot.collide(&q).unwrap());
+                        let q = between(base, &from, &to, free_until * f64::from(step) / 50.0);
+                        assert!(!robot.collide(&q).unwrap(), "{base:?}: {q:?}");
+                        samples += 1;
                     }
                 }
                 other => panic!("{other:?}"),
             }
             (free, hit) = (free + u32::from(is_free), hit + u32::from(!is_free));
         }
-        assert!(free >= 8 && hit >= 8, "{base:?}: {free} free, {hit} hit");
+        assert!(
+            free >= 8 && hit >= 8 && samples >= 4000,
+            "{base:?}: {free} free, {hit} hit, {samples} samples"
+        );
     }
 }
 
@@ -220,7 +238,7 @@ fn a_radius_makes_up_for_no_negative_margin() {
 fn bodies_keep_their_numbers() {
     let mut robot = arm(Base::Fixed);
     let links: Vec<String> = robot.links().map(str::to_owned).collect();
-    assert!(links.iter().enumerate().all(|(k, link)| robot.body(link).unwrap() == k));
+    assert!(links.len() > 4 && links.iter().enumerate().all(|(k, link)| robot.body(link).unwrap() == k));
     robot.add_obstacle("one", block([0.1; 3]), &at([2.0, 0.0, 0.0])).unwrap();
     let one = robot.body("one").unwrap();
     assert_eq!(robot.body_name(one), Some("one"));
@@ -264,6 +282,19 @@ fn margins_allowances_and_changes_count() {
     assert!(robot.collide(&still).unwrap() && !before.clone().collide(&still).unwrap());
     robot.remove("wall").unwrap();
     assert!(!robot.collide(&still).unwrap());
+}
+
+#[test]
+fn pairs_that_touch_often_are_allowed() {
+    let mut robot = arm_with_all_pairs(Base::Fixed);
+    let before = robot.pairs();
     let frequent = robot.allow_frequent(50, 0.5).unwrap();
-    assert!(frequent.iter().all(|(_, share)| *share >= 0.5));
+    let allowed: Vec<_> = frequent.iter().map(|(pair, _)| pair.clone()).collect();
+    // They touch in every configuration.
+    assert!(allowed.contains(&["turret", "upper_arm"].map(str::to_owned)), "{frequent:?}");
+    assert!(frequent.iter().all(|(_, share)| (0.5..=1.0).contains(share)), "{frequent:?}");
+    // The others are still asked about.
+    let rest = before.into_iter().filter(|pair| !allowed.contains(pair));
+    assert!(robot.pairs().into_iter().eq(rest) && !robot.pairs().is_empty());
+    assert_eq!(robot.allow_frequent(50, 0.5).unwrap(), []);
 }

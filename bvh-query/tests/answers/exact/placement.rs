@@ -55,6 +55,7 @@ fn check_place(pose: &Pose, point: [f64; 3]) {
 #[test]
 fn placed_corners_are_rounded_step_by_step() {
     let mut random = Random::new(41);
+    let mut placed = 0;
     for round in 0..20_000 {
         let spread = [1.0, 1e-20, 1e30, 1e7][round % 4];
         let rotation = turn(&mut random);
@@ -64,7 +65,9 @@ fn placed_corners_are_rounded_step_by_step() {
         let point = [(); 3].map(|()| f64::from(number(spread) as f32));
         check_place(&pose, point);
         check_place(&pose, point.map(|x| x + spread));
+        placed += 1;
     }
+    assert!(placed > 5_000, "{placed}");
 }
 
 /// Entries that would underflow in exact arithmetic count as 0, and no others do.

@@ -75,6 +75,7 @@ impl Tally {
              an interval: {inside}, {other} of them other than the computed distance says; {} intervals without the truth",
             self.missed
         ));
+        assert!(poses + pairs > 0, "{name}: expected something to ask about, found nothing");
         assert!(self.wrong.is_empty(), "{} wrong answers, the first: {}", self.wrong.len(), self.wrong[0]);
         assert!(
             self.missed == 0,
