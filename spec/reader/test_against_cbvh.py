@@ -3,8 +3,7 @@
     CBVH=target/release/cbvh python3 -m unittest discover -s spec/reader
 
 Without the variable CBVH, all tests are skipped. CBVH_MUTANTS sets how many damaged files to compare (1000 by default).
-Larger meshes come from a folder `shared` beside the repository. If it is missing, tests that need it are skipped and
-say so.
+Larger meshes come from a folder `shared` beside the repository. If it is missing, tests that need it are skipped.
 """
 
 import itertools
@@ -12,7 +11,6 @@ import json
 import os
 import random
 import subprocess
-import sys
 import tempfile
 import unittest
 from unittest import mock
@@ -149,14 +147,6 @@ class AgainstCbvh(unittest.TestCase):
             with self.subTest(change=change):
                 found.add(self.agreed(data, ROOM))
         return found
-
-    def shared(self, *names):
-        path = os.path.join(SHARED, *names)
-        if not os.path.exists(path):
-            reason = f"there is no {os.path.join('shared', *names)} beside the repository"
-            print(f"skipped: {reason}", file=sys.stderr)
-            self.skipTest(reason)
-        return path
 
     def check_bake(self, path, mesh):
         """Checks rules, requirements on writers, triangles, and the output of `dump` and `validate`."""
@@ -469,9 +459,10 @@ class AgainstCbvh(unittest.TestCase):
         self.assertNotEqual(data, file.data)
         self.assertEqual(self.agreed(data, ROOM), 0)
 
+    @unittest.skipUnless(os.path.exists(SHARED), "there is no folder shared beside the repository, with larger meshes")
     def test_larger_meshes(self):
         for name in ("piano", "apartment"):
-            mesh = self.shared("meshes", name + ".obj")
+            mesh = os.path.join(SHARED, "meshes", name + ".obj")
             for profile, triangles in (("dop26-u8-wide", "packed"), ("dop14-u8", "quantized")):
                 self.check_bake(self.bake(mesh, profile, triangles), mesh)
 

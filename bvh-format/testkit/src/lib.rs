@@ -16,10 +16,12 @@ pub mod here;
 pub mod loosen;
 pub mod random;
 pub mod seal;
+pub mod skip;
 pub mod stored;
 
 pub use here::{Pool, folder, pool};
 pub use random::Random;
+pub use skip::skip;
 pub use tempfile::TempDir;
 
 /// The three corners of a triangle, in mesh units.

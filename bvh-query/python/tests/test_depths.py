@@ -10,10 +10,8 @@ import unittest
 import numpy as np
 
 import cbvh
-from common import COMMAND, SHARED, WITHOUT_COMMAND
+from common import COMMAND, SHARED, WITHOUT_COMMAND, WITHOUT_SHARED
 from common import bottom_row, check_errors, cube, random_poses, shifts, turns, write_rows
-
-WITHOUT_DEPTHS = "there is no folder shared beside the checkout, with overlaps of known depth"
 
 
 def moved(poses, translations):
@@ -323,7 +321,7 @@ class SameBits(unittest.TestCase):
             self.assertGreater(len(set(found.kind.tolist())), 1)
 
 
-@unittest.skipUnless((SHARED / "depth").exists(), WITHOUT_DEPTHS)
+@unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
 class Labels(unittest.TestCase):
     def test_labelled_depths_are_between_the_bounds(self):
         count = 0

@@ -7,8 +7,8 @@ import unittest
 import numpy as np
 
 import cbvh
-from common import COMMAND, SHARED, WITHOUT_COMMAND, WITHOUT_SHARED
-from common import ask_command, cube, numbers_of, shifts
+from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
+from common import ask_command, cube, numbers_of, shifts, write_rows
 
 
 class Geometry(unittest.TestCase):
@@ -68,32 +68,53 @@ class Geometry(unittest.TestCase):
 
 
 @unittest.skipUnless(COMMAND, WITHOUT_COMMAND)
-@unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
 class SameBits(unittest.TestCase):
-    """Answers about meshes and probes of the folder shared are those of the command, bit for bit."""
+    """Answers about meshes and probes are those of the command, bit for bit."""
 
-    def test_probes_of_shared_meshes(self):
-        ways = {"closest": "points", "side": "points", "ray": "rays", "segment": "segments"}
+    def check(self, folder, source, files):
+        """Checks a mesh with files of points, rays and segments, and returns the modes with several answers."""
+        file, varied = folder / "mesh.cbvh", set()
+        mesh = cbvh.bake_files(source, file, force=True)
+        for mode, kind in {"closest": "points", "side": "points", "ray": "rays", "segment": "segments"}.items():
+            raw = ask_command(folder, "probe", file, files[kind], "--mode", mode, "--limit", 200)
+            raw = np.array([float(line[0]) for line in raw])
+            rows = numbers_of(files[kind], 200)
+            self.assertEqual(len(raw), len(rows))
+            first, last = rows[:, :3], rows[:, 3:6]
+            for parallel in (False, True):
+                # The command prints -1 for no hit.
+                found = {
+                    "closest": lambda: mesh.closest_points(first, parallel=parallel).distance,
+                    "side": lambda: mesh.sides(first, parallel=parallel),
+                    "ray": lambda: np.nan_to_num(mesh.first_hits(first, last, parallel=parallel).t, nan=-1.0),
+                    "segment": lambda: mesh.segment_hits(first, last, parallel=parallel),
+                }[mode]()
+                np.testing.assert_array_equal(np.asarray(found, float), raw, f"{source}, {mode}")
+            if len(set(raw.tolist())) > 1:
+                varied.add(mode)
+        return varied
+
+    def test_probes_of_a_small_mesh(self):
+        hand = TESTDATA / "robot" / "hand.obj"
+        corners = np.array([line.split()[1:4] for line in hand.read_text().splitlines() if line.startswith("v ")], float)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        # In the box of the mesh and around it.
+        places = np.random.default_rng(5).uniform(1.2 * low - 0.2 * high, 1.2 * high - 0.2 * low, (2, 150, 3))
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
-            for mesh_name in ("apollo", "bunny", "nao"):
-                file = folder / f"{mesh_name}.cbvh"
-                mesh = cbvh.bake_files(SHARED / "meshes" / f"{mesh_name}.obj", file)
-                for mode, kind in ways.items():
-                    probes = SHARED / "probes" / f"{mesh_name}_{kind}.txt"
-                    raw = ask_command(folder, "probe", file, probes, "--mode", mode, "--limit", 200)
-                    raw = np.array([float(line[0]) for line in raw])
-                    rows = numbers_of(probes, 200)
-                    first, last = rows[:, :3], rows[:, 3:6]
-                    for parallel in (False, True):
-                        # The command prints -1 for no hit.
-                        found = {
-                            "closest": lambda: mesh.closest_points(first, parallel=parallel).distance,
-                            "side": lambda: mesh.sides(first, parallel=parallel),
-                            "ray": lambda: np.nan_to_num(mesh.first_hits(first, last, parallel=parallel).t, nan=-1.0),
-                            "segment": lambda: mesh.segment_hits(first, last, parallel=parallel),
-                        }[mode]()
-                        np.testing.assert_array_equal(np.asarray(found, float), raw, f"{mesh_name}, {mode}")
+            files = {kind: folder / f"{kind}.txt" for kind in ("points", "rays", "segments")}
+            write_rows(files["points"], places[0])
+            write_rows(files["rays"], np.hstack([places[0], places[1] - places[0]]))
+            write_rows(files["segments"], np.hstack(places))
+            self.assertEqual(self.check(folder, hand, files), {"closest", "side", "ray", "segment"})
+
+    @unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
+    def test_probes_of_shared_meshes(self):
+        with tempfile.TemporaryDirectory() as name:
+            for mesh in ("apollo", "bunny", "nao"):
+                files = {kind: SHARED / "probes" / f"{mesh}_{kind}.txt" for kind in ("points", "rays", "segments")}
+                varied = self.check(pathlib.Path(name), SHARED / "meshes" / f"{mesh}.obj", files)
+                self.assertLessEqual({"closest", "ray", "segment"}, varied)
 
 
 if __name__ == "__main__":

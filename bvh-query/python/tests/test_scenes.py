@@ -6,6 +6,7 @@ import itertools
 import multiprocessing
 import pathlib
 import pickle
+import shutil
 import tempfile
 import threading
 import unittest
@@ -15,7 +16,7 @@ import numpy as np
 import cbvh
 from cbvh import MotionKind, Relation, Side
 from common import COMMAND, SHARED, TESTDATA, WITHOUT_COMMAND, WITHOUT_SHARED
-from common import ask_command, bottom_row, check_errors, cube, numbers_of, random_poses, shifts
+from common import ask_command, bottom_row, check_errors, cube, numbers_of, random_poses, shifts, write_rows
 
 
 def read_scene(path, folder):
@@ -643,33 +644,55 @@ class Sharing(unittest.TestCase):
 
 
 @unittest.skipUnless(COMMAND, WITHOUT_COMMAND)
-@unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
 class SameAnswers(unittest.TestCase):
-    """Answers about scenes of the folder shared are those of the command."""
+    """Answers about scenes are those of the command."""
 
-    def test_frames_of_shared_scenes(self):
+    def check(self, folder, files, near):
+        """Checks a scene and its frames, and returns the modes with several answers."""
+        scene, moving = read_scene(files[0], folder)
+        frames = numbers_of(files[1], 20).reshape(-1, len(moving), 12)
+        modes = {
+            "collide": scene.collide,
+            "pairs": lambda: len(scene.pairs_in_contact()),
+            "distance": lambda: scene.distance().nearest.distance,
+            "within": lambda: len(scene.pairs_within(near)),
+        }
+        varied = set()
+        for mode, ask in modes.items():
+            within = ["--within", str(near)] if mode == "within" else []
+            raw = ask_command(folder, "scene", *files, "--mode", mode, "--limit", len(frames), *within)
+            raw = [float(line[0]) for line in raw]
+            for scene.parallel, scene.tracking in ((False, False), (True, True)):
+                found = []
+                for frame in frames:
+                    scene.set_poses(moving, bottom_row(frame))
+                    found.append(float(ask()))
+                self.assertEqual(found, raw, f"{files[0]} {mode}")
+            if len(set(raw)) > 1:
+                varied.add(mode)
+        return varied
+
+    def test_frames_of_a_small_scene(self):
         with tempfile.TemporaryDirectory() as name:
-            for stem in ("clutter60", "arm"):
-                folder = pathlib.Path(name) / stem
-                folder.mkdir()
+            folder = pathlib.Path(name)
+            for mesh in ("fclenv", "fclrob"):
+                shutil.copy(TESTDATA / f"{mesh}.obj", folder)
+            still = " ".join(str(float(x)) for x in np.eye(4)[:3].ravel())
+            lines = ["mesh room fclenv.obj", "mesh robot fclrob.obj", f"instance room room {still}"]
+            lines += [f"instance {which} robot {still}" for which in "ab"]
+            (folder / "cell.scene").write_text("\n".join([*lines, "moving a b"]) + "\n")
+            poses = random_poses(7, 40, 2500.0)
+            poses[:, :3, 3] += [300, -1600, -500]
+            write_rows(folder / "frames.txt", poses[:, :3].reshape(20, 24))
+            files = folder / "cell.scene", folder / "frames.txt"
+            self.assertEqual(self.check(folder, files, 400.0), {"collide", "pairs", "distance", "within"})
+
+    @unittest.skipUnless(SHARED.exists(), WITHOUT_SHARED)
+    def test_frames_of_shared_scenes(self):
+        for stem in ("clutter60", "arm"):
+            with tempfile.TemporaryDirectory() as name:
                 files = SHARED / "scenes" / f"{stem}.scene", SHARED / "scenes" / f"{stem}_frames.txt"
-                scene, moving = read_scene(files[0], folder)
-                frames = numbers_of(files[1], 20).reshape(-1, len(moving), 12)
-                modes = {
-                    "collide": scene.collide,
-                    "pairs": lambda: len(scene.pairs_in_contact()),
-                    "distance": lambda: scene.distance().nearest.distance,
-                    "within": lambda: len(scene.pairs_within(0.05)),
-                }
-                for mode, ask in modes.items():
-                    within = ["--within", "0.05"] if mode == "within" else []
-                    raw = ask_command(folder, "scene", *files, "--mode", mode, "--limit", len(frames), *within)
-                    for scene.parallel, scene.tracking in ((False, False), (True, True)):
-                        found = []
-                        for frame in frames:
-                            scene.set_poses(moving, bottom_row(frame))
-                            found.append(float(ask()))
-                        self.assertEqual(found, [float(line[0]) for line in raw], f"{stem} {mode}")
+                self.assertIn("distance", self.check(pathlib.Path(name), files, 0.05))
 
 
 if __name__ == "__main__":

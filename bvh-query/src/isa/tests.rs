@@ -45,7 +45,7 @@ fn every_backend_decodes_to_the_bits_of_the_reference() {
     let mut random = || (random.bits() >> 32) as u32;
     for backend in Backend::ALL {
         if !backend.is_available() {
-            println!("skipped: this CPU lacks {backend}");
+            cbvh_testkit::skip(&format!("this CPU has no {backend}"));
             continue;
         }
         for profile in Profile::ALL {

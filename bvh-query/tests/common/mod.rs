@@ -99,7 +99,7 @@ pub(crate) fn size(a: &[Triangle], b: &[Triangle]) -> f64 {
 /// Returns the backends of this CPU, and notes which ones it lacks.
 pub(crate) fn backends() -> Vec<Backend> {
     let (here, missing): (Vec<_>, Vec<_>) = Backend::ALL.into_iter().partition(|b| b.is_available());
-    missing.iter().for_each(|backend| note(&format!("skipped: this CPU has no {backend}")));
+    missing.iter().for_each(|backend| cbvh_testkit::skip(&format!("this CPU has no {backend}")));
     here
 }
 
@@ -107,22 +107,35 @@ pub(crate) fn queriers() -> Vec<Querier> {
     backends().into_iter().map(Querier::with_backend).collect()
 }
 
-#[allow(clippy::print_stderr, reason = "what was not tested has to be said")]
+#[allow(clippy::print_stderr, reason = "who looks for it sees how much was tested")]
 pub(crate) fn note(line: &str) {
     eprintln!("{line}");
 }
 
-/// Returns a file of `shared/`, a folder beside the repository that not everyone has, and notes if it is missing.
-pub(crate) fn shared(name: &str) -> Option<PathBuf> {
+/// Returns a file of `shared/`, a folder beside the repository that not everyone has. Tests that need it are ignored for the
+/// reason `needs ../shared`; `.ci/run` runs them where the folder is there.
+pub(crate) fn shared(name: &str) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    note(&format!("skipped: there is no {}", path.display()));
-    None
+    assert!(path.exists(), "{}: expected this file, found none", path.display());
+    path
 }
 
 /// Returns a mesh of `shared/meshes`.
-pub(crate) fn shared_mesh(name: &str) -> Option<Mesh> {
-    Some(bvh_bake::input::read(&shared(&format!("meshes/{name}"))?).unwrap())
+pub(crate) fn shared_mesh(name: &str) -> Mesh {
+    bvh_bake::input::read(&shared(&format!("meshes/{name}"))).unwrap()
+}
+
+/// Returns a file of `testdata/`.
+pub(crate) fn testdata(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)
+}
+
+/// Returns both meshes of FCL's test pair, which are in `testdata/`.
+pub(crate) fn fcl_pair() -> [Mesh; 2] {
+    ["fclenv.obj", "fclrob.obj"].map(|name| bvh_bake::input::read(&testdata(name)).unwrap())
+}
+
+/// Returns the lines of a text that say something, without comments of whole lines.
+pub(crate) fn stated(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter(|line| !line.starts_with('#'))
 }

@@ -467,11 +467,9 @@ fn scenes_have_simple_shapes_and_margins() {
 
 /// The open scenes with shapes: every answer is right, and the same on every backend and on two threads.
 #[test]
+#[ignore = "needs ../shared"]
 fn open_scenes_with_shapes_have_true_answers() {
-    let Some(folder) = crate::common::shared("shapes") else {
-        crate::common::skip("there is no folder shared beside the checkout, with scenes of shapes");
-        return;
-    };
+    let folder = crate::common::shared("shapes");
     let place = place();
     for name in ["cell", "cloud", "padded", "robot"] {
         let [scene, frames] = [".scene", "_frames.txt"].map(|end| folder.join(format!("{name}{end}")));

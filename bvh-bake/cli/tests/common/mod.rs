@@ -3,6 +3,7 @@
 
 pub(crate) mod sheet;
 
+pub(crate) use cbvh_testkit::skip;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -212,16 +213,12 @@ pub(crate) fn poses(count: usize, from: f64, to: f64) -> String {
 /// The folder of small meshes and frozen files.
 pub(crate) const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 
-/// Returns a folder of test material beside the repository, if it exists.
-pub(crate) fn shared(name: &str) -> Option<PathBuf> {
+/// Returns a folder of `shared/`, a folder beside the repository that not everyone has. Tests that need it are ignored for the
+/// reason `needs ../shared`; `.ci/run` runs them where the folder is there.
+pub(crate) fn shared(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(name);
-    folder.is_dir().then_some(folder)
-}
-
-/// Says that a test was skipped.
-#[allow(clippy::print_stderr, reason = "a test that does nothing must say so")]
-pub(crate) fn skip(why: &str) {
-    eprintln!("skipped: {why}");
+    assert!(folder.is_dir(), "{}: expected this folder, found none", folder.display());
+    folder
 }
 
 /// Returns the backends that this CPU has.
@@ -232,7 +229,7 @@ pub(crate) fn backends(directory: &Path) -> Vec<&'static str> {
         let asked = cbvh_in(directory, &["query", "one.obj", "one.obj", "--isa", isa, "--pose", pose]);
         if asked.code != 0 {
             asked.failed(1, &["this CPU lacks", isa]);
-            skip(&format!("this CPU lacks {isa}"));
+            skip(&format!("this CPU has no {isa}"));
             return false;
         }
         true

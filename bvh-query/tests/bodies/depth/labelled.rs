@@ -1,7 +1,7 @@
 //! The open data of overlaps with labelled depths, and its purely geometric check: no triangles meet after the translation.
 
 use super::{moved, penetration};
-use crate::common::{bake, corners, note, placed, queriers, shared, shared_mesh, stored};
+use crate::common::{bake, corners, placed, queriers, shared, shared_mesh, stored};
 use bvh_bake::Options;
 use bvh_query::{PenetrationOptions, Pose, QueryError};
 use cbvh_testkit::exact::{Boxed, Decided, intersect};
@@ -25,15 +25,16 @@ fn read(text: &str) -> Vec<Labelled> {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn labelled_depths_are_between_the_bounds() {
-    let Some(pairs) = shared("depth/pairs.txt") else { return note("skipped: there is no depth/pairs.txt") };
+    let pairs = shared("depth/pairs.txt");
     let text = std::fs::read_to_string(&pairs).unwrap();
     let mut queriers = queriers();
     let (mut ratios, mut count) = ([0.0; 2], 0);
     for line in text.lines().filter(|line| !line.starts_with('#')) {
         let words: Vec<&str> = line.split_whitespace().collect();
         let [a, b] = [words[1], words[2]]
-            .map(|name| bake(&shared_mesh(&format!("../depth/{name}")).unwrap(), &Options::default()));
+            .map(|name| bake(&shared_mesh(&format!("../depth/{name}")), &Options::default()));
         let poses = std::fs::read_to_string(pairs.with_file_name(format!("{}.txt", words[0]))).unwrap();
         let [of_a, of_b] = [&a, &b].map(|bvh| corners(&stored(bvh)));
         for (number, (pose, depth)) in read(&poses).into_iter().enumerate().step_by(3) {
@@ -62,6 +63,7 @@ fn labelled_depths_are_between_the_bounds() {
             }
         }
     }
+    assert!(count > 300, "{count} overlaps");
     let means = ratios.map(|sum: f64| (sum / f64::from(count)).exp());
     assert!(means[0] < 1.05 && means[1] < 2.0, "{means:?} over {count}");
 }

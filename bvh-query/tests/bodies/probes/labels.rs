@@ -1,10 +1,10 @@
 //! Reads the labelled probes.
 
-use crate::common::{bake, shared};
+use crate::common::{bake, shared, stated};
 use bvh_query::Bvh;
 
 /// Calls `check` with each labelled line about a mesh: its numbers, the words of its label and the line itself. The mesh is that
-/// of an OBJ rounded to f32, as the labels are about.
+/// of an OBJ rounded to f32, as the labels are about. Each mesh has a thousand lines.
 pub(crate) fn each_label<const N: usize>(
     names: &[&str],
     kind: &str,
@@ -12,14 +12,15 @@ pub(crate) fn each_label<const N: usize>(
 ) {
     for name in names {
         let folder = if *name == "ball" { "probes" } else { "meshes" };
-        let Some(path) = shared(&format!("{folder}/{name}.obj")) else { return };
-        let Some(probes) = shared(&format!("probes/{name}_{kind}.txt")) else { return };
+        let path = shared(&format!("{folder}/{name}.obj"));
+        let probes = std::fs::read_to_string(shared(&format!("probes/{name}_{kind}.txt"))).unwrap();
+        assert_eq!(stated(&probes).count(), 1000, "{name}_{kind}");
         let mut read = bvh_bake::input::read(&path).unwrap();
         for object in &mut read.objects {
             object.positions.iter_mut().for_each(|p| *p = p.map(|v| f64::from(v as f32)));
         }
         let bvh = bake(&read, &bvh_bake::Options::default());
-        for line in std::fs::read_to_string(probes).unwrap().lines().filter(|line| !line.starts_with('#')) {
+        for line in stated(&probes) {
             let (numbers, label) = line.split_once('#').unwrap();
             let mut numbers = numbers.split_whitespace().map(|word| word.parse::<f64>().unwrap());
             let numbers = [(); N].map(|()| numbers.next().unwrap());
