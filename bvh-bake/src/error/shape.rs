@@ -20,7 +20,7 @@ pub enum ShapeError {
     HalfSpace(&'static str),
     /// An error for which a polygon around a circle would need too many sides.
     #[error(
-        "most_error: expected an error for which 4096 sides suffice, at least 3e-7 of the radius, found {0}"
+        "max_error: expected an error for which 4096 sides suffice, at least 3e-7 of the radius, found {0}"
     )]
     Sides(f64),
     /// Heights that are no grid.

@@ -100,8 +100,8 @@ pub struct Circumscribed {
 /// # Errors
 /// [`ShapeError::Length`] if a length is not finite and above 0, and [`ShapeError::Sides`] if the error is so small beside the
 /// radius that the prism would have more than 4,096 sides.
-pub fn cylinder(radius: f64, length: f64, most_error: f64) -> Result<Circumscribed, ShapeError> {
-    let (ring, error) = ring(radius, most_error)?;
+pub fn cylinder(radius: f64, length: f64, max_error: f64) -> Result<Circumscribed, ShapeError> {
+    let (ring, error) = ring(radius, max_error)?;
     check("length", length)?;
     // Wider at the ends, too: they are rounded to f32.
     let (sides, half) = (ring.len() as u32, length / 2.0 * ROUNDING);
@@ -122,8 +122,8 @@ pub fn cylinder(radius: f64, length: f64, most_error: f64) -> Result<Circumscrib
 ///
 /// # Errors
 /// The errors of [`cylinder`].
-pub fn cone(radius: f64, height: f64, most_error: f64) -> Result<Circumscribed, ShapeError> {
-    let (ring, error) = ring(radius, most_error)?;
+pub fn cone(radius: f64, height: f64, max_error: f64) -> Result<Circumscribed, ShapeError> {
+    let (ring, error) = ring(radius, max_error)?;
     check("height", height)?;
     let sides = ring.len() as u32;
     let mut triangles = Vec::new();
@@ -142,13 +142,13 @@ pub fn cone(radius: f64, height: f64, most_error: f64) -> Result<Circumscribed, 
 }
 
 /// Returns a regular polygon around a circle, and how far its corners are at most from the circle.
-fn ring(radius: f64, most_error: f64) -> Result<(Vec<[f64; 2]>, f64), ShapeError> {
+fn ring(radius: f64, max_error: f64) -> Result<(Vec<[f64; 2]>, f64), ShapeError> {
     check("radius", radius)?;
-    check("most_error", most_error)?;
+    check("max_error", max_error)?;
     // The same digits on every system.
-    let sides = (PI / libm::acos(radius / (radius + most_error))).ceil().max(3.0);
+    let sides = (PI / libm::acos(radius / (radius + max_error))).ceil().max(3.0);
     if sides.is_nan() || sides > MAX_SIDES {
-        return Err(ShapeError::Sides(most_error));
+        return Err(ShapeError::Sides(max_error));
     }
     let corner = radius / libm::cos(PI / sides) * ROUNDING;
     let at = |number: u32| {
@@ -218,18 +218,14 @@ mod tests {
     fn solids_are_closed_look_outwards_and_contain_what_they_stand_for() {
         assert!((volume(&block([1.0, 2.0, 3.0]).unwrap()) - 6.0).abs() < 1e-12);
         assert!((volume(&ground([10.0, 4.0], 0.5).unwrap()) - 20.0).abs() < 1e-12);
-        for (radius, most_error) in [(1.0, 0.1), (2.0, 0.005), (0.1, 5.0), (1e-6, 1e-9)] {
-            let prism = cylinder(radius, 3.0, most_error).unwrap();
+        for (radius, max_error) in [(1.0, 0.1), (2.0, 0.005), (0.1, 5.0), (1e-6, 1e-9)] {
+            let prism = cylinder(radius, 3.0, max_error).unwrap();
             let exact = PI * radius * radius * 3.0;
             let found = volume(&prism.mesh);
             assert!(
                 found > exact && found < exact * (1.0 + prism.error / radius).powi(2) * (1.0 + prism.error)
             );
-            assert!(
-                prism.error <= most_error * 1.001 + 2e-6 * (1.5 + radius),
-                "{} {most_error}",
-                prism.error
-            );
+            assert!(prism.error <= max_error * 1.001 + 2e-6 * (1.5 + radius), "{} {max_error}", prism.error);
             // All sides are outside the circle, also after they are rounded to f32.
             let ring: Vec<[f64; 3]> =
                 prism.mesh.objects[0].positions.iter().map(|p| p.map(|x| f64::from(x as f32))).collect();
@@ -241,7 +237,7 @@ mod tests {
                 assert!(away >= radius, "{away} {radius}");
                 assert!(px.hypot(py) <= radius + prism.error);
             }
-            let pyramid = cone(radius, 3.0, most_error).unwrap();
+            let pyramid = cone(radius, 3.0, max_error).unwrap();
             assert!(volume(&pyramid.mesh) > exact / 3.0);
         }
     }
@@ -286,6 +282,10 @@ mod tests {
             );
         }
         assert_eq!(cylinder(1.0, 1.0, 1e-12), Err(ShapeError::Sides(1e-12)));
+        for error in [0.0, 1e-12] {
+            // The name that the argument has in every language.
+            assert!(cone(1.0, 1.0, error).unwrap_err().to_string().starts_with("max_error: "), "{error}");
+        }
         assert_eq!(ground([1.0, f64::INFINITY], 1.0), Err(ShapeError::HalfSpace("side")));
         assert_eq!(ground([1.0; 2], f64::INFINITY), Err(ShapeError::HalfSpace("thickness")));
     }

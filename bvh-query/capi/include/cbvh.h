@@ -301,13 +301,13 @@ cbvh_status cbvh_bake_box(const double *sides, cbvh_mesh *mesh);
  * There is nothing beyond its sides. */
 cbvh_status cbvh_bake_ground(const double *sides, double thickness, cbvh_mesh *mesh);
 /* Bakes a prism around a cylinder, whose axis is z and whose middle is at the origin. No point of the prism is farther
- * from the cylinder than `error`, which is at most `most_error` and what the rounding of vertices adds; `error` may be
- * NULL. CBVH_INVALID_ARGUMENT if the prism would need more than 4,096 sides: if `most_error` is less than about 3e-7 of
+ * from the cylinder than `error`, which is at most `max_error` and what the rounding of vertices adds; `error` may be
+ * NULL. CBVH_INVALID_ARGUMENT if the prism would need more than 4,096 sides: if `max_error` is less than about 3e-7 of
  * the radius. */
-cbvh_status cbvh_bake_cylinder(double radius, double length, double most_error, double *error, cbvh_mesh *mesh);
+cbvh_status cbvh_bake_cylinder(double radius, double length, double max_error, double *error, cbvh_mesh *mesh);
 /* Bakes a pyramid around a cone, whose base is centred at the origin in the plane z = 0 and whose apex is at z =
  * `height`. The errors are those of cbvh_bake_cylinder. */
-cbvh_status cbvh_bake_cone(double radius, double height, double most_error, double *error, cbvh_mesh *mesh);
+cbvh_status cbvh_bake_cone(double radius, double height, double max_error, double *error, cbvh_mesh *mesh);
 /* Bakes a surface over a grid, without a thickness: `heights` has the z of `columns` points along x, row by row along
  * y. `cell` is 2 numbers: how far columns and rows are apart. The first point is at x = y = 0. There are 2 triangles
  * per cell. CBVH_INVALID_ARGUMENT for fewer than 2 columns or 2 rows. */

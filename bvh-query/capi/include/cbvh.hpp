@@ -469,12 +469,12 @@ public:
         return made([&](cbvh_mesh *mesh) { return cbvh_bake_ground(sides.data(), thickness, mesh); });
     }
     /// A prism around a cylinder along z: see cbvh_bake_cylinder. `error` gets how far it reaches beyond that.
-    static Mesh cylinder(double radius, double length, double most_error, double *error = nullptr) {
-        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cylinder(radius, length, most_error, error, mesh); });
+    static Mesh cylinder(double radius, double length, double max_error, double *error = nullptr) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cylinder(radius, length, max_error, error, mesh); });
     }
     /// A pyramid around a cone along z: see cbvh_bake_cone.
-    static Mesh cone(double radius, double height, double most_error, double *error = nullptr) {
-        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cone(radius, height, most_error, error, mesh); });
+    static Mesh cone(double radius, double height, double max_error, double *error = nullptr) {
+        return made([&](cbvh_mesh *mesh) { return cbvh_bake_cone(radius, height, max_error, error, mesh); });
     }
     /// A surface over a grid: whole rows of heights along y, each of `columns` numbers along x.
     static Mesh height_field(const std::vector<double> &heights, std::size_t columns,

@@ -113,24 +113,24 @@ pub unsafe extern "C" fn cbvh_bake_ground(sides: *const f64, thickness: f64, mes
 pub unsafe extern "C" fn cbvh_bake_cylinder(
     radius: f64,
     length: f64,
-    most_error: f64,
+    max_error: f64,
     error: *mut f64,
     mesh: *mut MeshHandle,
 ) -> i32 {
     // SAFETY: the header asks for it.
-    unsafe { bake_around(mesh, error, || shapes::cylinder(radius, length, most_error)) }
+    unsafe { bake_around(mesh, error, || shapes::cylinder(radius, length, max_error)) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_bake_cone(
     radius: f64,
     height: f64,
-    most_error: f64,
+    max_error: f64,
     error: *mut f64,
     mesh: *mut MeshHandle,
 ) -> i32 {
     // SAFETY: the header asks for it.
-    unsafe { bake_around(mesh, error, || shapes::cone(radius, height, most_error)) }
+    unsafe { bake_around(mesh, error, || shapes::cone(radius, height, max_error)) }
 }
 
 #[unsafe(no_mangle)]

@@ -54,14 +54,14 @@ pub(crate) fn cylinder_core(
     py: Python<'_>,
     radius: f64,
     length: f64,
-    most_error: f64,
+    max_error: f64,
 ) -> PyResult<(Mesh, f64)> {
-    around(py, shapes::cylinder(radius, length, most_error))
+    around(py, shapes::cylinder(radius, length, max_error))
 }
 
 #[pyfunction]
-pub(crate) fn cone_core(py: Python<'_>, radius: f64, height: f64, most_error: f64) -> PyResult<(Mesh, f64)> {
-    around(py, shapes::cone(radius, height, most_error))
+pub(crate) fn cone_core(py: Python<'_>, radius: f64, height: f64, max_error: f64) -> PyResult<(Mesh, f64)> {
+    around(py, shapes::cone(radius, height, max_error))
 }
 
 /// Heights of shape (rows, columns).

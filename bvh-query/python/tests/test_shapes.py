@@ -174,7 +174,7 @@ class Shapes(unittest.TestCase):
                 (ValueError, "side", lambda: cbvh.box([1, 1, 1], rounding=0.5)),
                 (ValueError, "sides", lambda: cbvh.box([1, 1])),
                 (ValueError, "length", lambda: cbvh.cylinder(1, nan)),
-                (ValueError, "most_error", lambda: cbvh.cone(1, 1, max_error=0)),
+                (ValueError, "max_error", lambda: cbvh.cone(1, 1, max_error=0)),
                 (ValueError, "heights", lambda: cbvh.height_field([1, 2], [1, 1])),
                 (ValueError, "cells", lambda: cbvh.voxels([[0.5, 0, 0]], 1)),
                 (ValueError, "cells", lambda: cbvh.voxels(np.ones((2, 2), bool), 1)),

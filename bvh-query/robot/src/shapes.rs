@@ -50,8 +50,8 @@ impl<'a> Shapes<'a> {
                 Ok(baked(shapes::segment(half.map(|x| -x), half))?.rounded(radius)?)
             }
             Described::Cylinder { radius, length } => {
-                let most_error = radius * self.options.cylinder_error;
-                Ok(baked(shapes::cylinder(radius, length, most_error).map_err(shape)?.mesh)?.solid()?)
+                let max_error = radius * self.options.cylinder_error;
+                Ok(baked(shapes::cylinder(radius, length, max_error).map_err(shape)?.mesh)?.solid()?)
             }
             Described::Mesh { ref uri, scale } => self.mesh(link, uri, scale),
         }

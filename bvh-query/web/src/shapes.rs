@@ -3,6 +3,7 @@
 use crate::arguments::{refused, wrong};
 use crate::bake::bake_mesh;
 use crate::mesh::Mesh;
+use bvh_bake::ShapeError;
 use bvh_bake::shapes::{Circumscribed, cone, cylinder, height_field};
 use js_sys::Float64Array;
 use wasm_bindgen::prelude::*;
@@ -17,5 +18,7 @@ pub fn bake_shape(kind: &str, numbers: &[f64], list: &Float64Array) -> Result<Me
         ("heightField", &[columns, x, y]) => height_field(columns as usize, &list.to_vec(), [x, y]),
         _ => return Err(wrong("kind", format_args!("expected a shape, found {kind}")).into()),
     };
-    bake_mesh(&made.map_err(refused)?, &JsValue::UNDEFINED)
+    // The argument has the name that JavaScript gives it.
+    let named = |error: ShapeError| refused(error.to_string().replacen("max_error", "maxError", 1));
+    bake_mesh(&made.map_err(named)?, &JsValue::UNDEFINED)
 }
