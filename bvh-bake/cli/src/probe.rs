@@ -21,7 +21,8 @@ With --mode closest and side, each line of FILE is a point, 3 numbers. With --mo
 a ray, 6 numbers; the direction may have any length. With --mode segment it is both ends of a segment, 6 numbers. All are in \
 the frame of the mesh, in mesh units. # starts a comment.
 
-closest is the distance to the surface, whether the point is inside or outside. side is defined for meshes that are closed \
+closest is the distance to the surface, whether the point is inside or outside. The surface is all triangles of the mesh: \
+where parts overlap, the closest one may be inside. side is defined for meshes that are closed \
 and consistently oriented; for others it is undefined, except on the surface. A ray or a segment that only touches an edge or \
 a corner hits the mesh.
 

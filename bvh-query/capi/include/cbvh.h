@@ -847,7 +847,8 @@ cbvh_status cbvh_closest_points(cbvh_querier querier, cbvh_mesh mesh, const cbvh
  * than the radius, or inside them. */
 cbvh_status cbvh_sides(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points, size_t count,
                        cbvh_side *answers);
-/* Answers both questions. */
+/* Answers both questions. The surface is all triangles of the mesh: where closed parts of it overlap, or one lies within
+ * another, the closest triangle may be inside the mesh, and the distance is less than that to the outside. */
 cbvh_status cbvh_signed_distances(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points,
                                   size_t count, double within, cbvh_closest_point *answers);
 

@@ -127,7 +127,8 @@ pub enum Side {
     Undefined = 2,
 }
 
-/// The distance of a point from a mesh, and the side that it is on.
+/// The distance of a point from the surface of a mesh, and the side that it is on. Inside overlapping parts of one mesh, the
+/// closest surface may be a face between them: see [`Querier::signed_distance`](crate::Querier::signed_distance).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct SignedDistance {

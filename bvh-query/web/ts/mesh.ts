@@ -502,7 +502,9 @@ export class Mesh extends Handle<raw.Mesh> {
 
     /**
      * Distances of N points from the surface, negative inside; NaN if the mesh has no inside, because it is not closed, or if
-     * the surface is farther away than `within`. Options are those of `closestPoints`.
+     * the surface is farther away than `within`. The surface is all triangles of the mesh: where closed parts of it overlap,
+     * the closest one may be inside, and the distance is less than that to the outside. Options are those of
+     * `closestPoints`.
      */
     signedDistances(points: Numbers, options: { within?: number; pose?: Numbers } = {}): Float64Array {
         const { within = Number.POSITIVE_INFINITY } = options;

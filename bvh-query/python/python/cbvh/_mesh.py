@@ -454,8 +454,9 @@ class Mesh:
     ) -> Any:
         """Distances of points from the surface, negative inside: a float, or an array of shape (N,).
 
-        NaN if the mesh has no inside, because it is not closed, or if the surface is farther away than ``within``.
-        ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
+        NaN if the mesh has no inside, because it is not closed, or if the surface is farther away than ``within``. The
+        surface is all triangles of the mesh: where closed parts of it overlap, the closest one may be inside, and the
+        distance is less than that to the outside. ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
         return _cbvh.signed_distances((self._mesh, pose, parallel), points, within)
 

@@ -53,6 +53,10 @@ impl Querier {
     /// farther away than `within`. The signed distance is that of the surface, negative inside. These are two
     /// questions, and each has the whole budget.
     ///
+    /// The surface is all triangles of the mesh. Where closed parts of it overlap, or one lies within another, the closest
+    /// triangle may be inside the mesh: the distance is then less than that to the outside. Unite the parts before baking
+    /// if only their outer surface matters.
+    ///
     /// # Errors
     /// The errors of [`Querier::closest_point`] and [`Querier::side`].
     pub fn signed_distance<'a>(

@@ -3,7 +3,7 @@
 use super::hard::{in_poses, point};
 use super::labels::{each_label, number};
 use super::rationals::{first, winding};
-use crate::common::shapes::{on_lattice, outward, sphere};
+use crate::common::shapes::{cube, on_lattice, outward, sphere};
 use crate::common::{Random, Triangle, baked, note, queriers};
 use bvh_query::Side;
 use cbvh_testkit::depth::rounds;
@@ -59,6 +59,17 @@ fn a_point_outside_the_box_costs_no_walk() {
     }
     assert_eq!(querier.side(&bvh, [0.01, 0.02, 0.03]), Ok(Side::Inside));
     assert!(querier.stats().node_tests > 0);
+}
+
+/// Overlapping parts are one solid, but their faces inside it are still faces of the mesh.
+#[test]
+fn inside_overlapping_parts_the_closest_face_may_be_an_inner_one() {
+    let beside: Vec<Triangle> = cube().iter().map(|t| t.map(|[x, y, z]| [x + 1.5, y, z])).collect();
+    let bvh = baked(&[cube(), beside].concat());
+    let mut querier = bvh_query::Querier::new().unwrap();
+    // The faces at 0.5 and 1 are inside the other part; the outside is at a distance of 1.
+    let signed = querier.signed_distance(&bvh, [0.625, 0.0, 0.0], f64::INFINITY).unwrap().unwrap();
+    assert_eq!((signed.side, signed.value()), (Side::Inside, Some(-0.125)));
 }
 
 #[test]
