@@ -10,15 +10,53 @@
 //! which are not fused. Other operations may round differently (`mul_add` is fused where the CPU supports it), so their
 //! results are used only in filters with derived error bounds.
 
-/// Calls intrinsics whose features the token of a backend stands for.
+/// Computes with registers by intrinsics, given a proof that the target or the CPU has their features: a value of a type that
+/// implements the `Proof` of the file. The intrinsics in `$body` access no memory; those that do are in `loads!` and `stores!`.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! with_features {
-    ($body:expr) => {
-        // SAFETY: a value of the backend's types exists only if the target has all features that these intrinsics need, or
-        // if `detect` has found that the CPU has them. Loads and stores go through references to arrays of exactly their
-        // size, or to parts of such arrays, and need no alignment.
+    ($proof:expr, $body:expr) => {{
+        #[inline(always)]
+        fn given(_: impl Proof) {}
+        given($proof);
+        // SAFETY: there is a proof of the features that these intrinsics need, and they need nothing else.
         unsafe { $body }
+    }};
+}
+
+/// Defines functions that load a register from an array of exactly its size, by an intrinsic that needs no alignment.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+macro_rules! loads {
+    ($($name:ident($array:ty) -> $register:ty = $intrinsic:ident;)+) => {
+        $(#[inline(always)]
+        fn $name(_proof: impl Proof, from: &$array) -> $register {
+            const { assert!(size_of::<$array>() == size_of::<$register>()) };
+            // SAFETY: there is a proof of the feature that the intrinsic needs. It reads as many bytes as a register has, which
+            // are those of the array.
+            unsafe { $intrinsic(std::ptr::from_ref(from).cast()) }
+        })+
     };
+}
+
+/// Defines functions that store a register to an array of exactly its size, by an intrinsic that needs no alignment.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+macro_rules! stores {
+    ($($name:ident($register:ty) -> $array:ty = $intrinsic:ident;)+) => {
+        $(#[inline(always)]
+        fn $name(_proof: impl Proof, value: $register, to: &mut $array) {
+            const { assert!(size_of::<$array>() == size_of::<$register>()) };
+            // SAFETY: there is a proof of the feature that the intrinsic needs. It writes as many bytes as a register has, to
+            // those of the array, where any bytes are numbers.
+            unsafe { $intrinsic(std::ptr::from_mut(to).cast(), value) }
+        })+
+    };
+}
+
+/// Returns the halves of an array.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn halves<T, const N: usize>(from: &[T]) -> [&[T; N]; 2] {
+    let (halves, []) = from.as_chunks() else { unreachable!("two halves") };
+    [&halves[0], &halves[1]]
 }
 
 /// Defines methods of `Lanes` by an intrinsic each, for lanes in one register, `(0)`, or in two, `(0, 1)`.
@@ -30,13 +68,13 @@ macro_rules! by_intrinsics {
     (@ (0) $name:ident($($other:ident),*) $intrinsic:ident) => {
         #[inline(always)]
         fn $name(self, $($other: Self),*) -> Self {
-            Self(with_features!($intrinsic(self.0, $($other.0),*)))
+            Self(with_features!(self, $intrinsic(self.0, $($other.0),*)))
         }
     };
     (@ (0, 1) $name:ident($($other:ident),*) $intrinsic:ident) => {
         #[inline(always)]
         fn $name(self, $($other: Self),*) -> Self {
-            with_features!(Self($intrinsic(self.0, $($other.0),*), $intrinsic(self.1, $($other.1),*)))
+            with_features!(self, Self($intrinsic(self.0, $($other.0),*), $intrinsic(self.1, $($other.1),*)))
         }
     };
 }

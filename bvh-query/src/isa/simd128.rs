@@ -1,7 +1,7 @@
 //! The SIMD128 backend: registers of four lanes, in WebAssembly that is compiled for an engine which has them.
 //!
-//! Loads and stores are `unsafe`, because they take pointers. Here these come from references to arrays of exactly the size
-//! that is read or written, and need no alignment.
+//! Loads and stores are `unsafe`, because they take pointers. They need no alignment. The target has all instructions, so that
+//! the others are safe.
 
 use super::Lanes;
 use super::quads::{Four, Quad};
@@ -81,12 +81,12 @@ impl Quad for Simd128 {
     }
     #[inline(always)]
     fn load(from: &[f32; 4]) -> Self {
-        // SAFETY: see above.
+        // SAFETY: it reads 16 bytes, those of the array.
         Self(unsafe { v128_load(from.as_ptr().cast()) })
     }
     #[inline(always)]
     fn store(self, to: &mut [f32; 4]) {
-        // SAFETY: see above.
+        // SAFETY: it writes 16 bytes, those of the array.
         unsafe { v128_store(to.as_mut_ptr().cast(), self.0) }
     }
     #[inline(always)]
@@ -117,7 +117,7 @@ impl Quad for Simd128 {
     // less than that of an f32. Shifting the former would make subnormal f32, which are slow.
     #[inline(always)]
     fn codes_f16(from: &[u8; 8]) -> Self {
-        // SAFETY: see above.
+        // SAFETY: it reads 8 bytes, those of the array.
         let codes = unsafe { u32x4_load_extend_u16x4(from.as_ptr().cast()) };
         let tiny = f32x4_mul(f32x4_convert_i32x4(codes), f32x4_splat(1.0 / (1 << 24) as f32));
         let usual = i32x4_add(i32x4_shl(codes, 13), i32x4_splat(112 << 23));
@@ -165,20 +165,20 @@ impl Quad for Simd128 {
 
 #[inline(always)]
 fn bytes(from: &[u8; 16]) -> v128 {
-    // SAFETY: see above.
+    // SAFETY: it reads 16 bytes, those of the array.
     unsafe { v128_load(from.as_ptr().cast()) }
 }
 
 #[inline(always)]
 fn array(bytes: v128) -> [u8; 16] {
     let mut to = [0; 16];
-    // SAFETY: see above.
+    // SAFETY: it writes 16 bytes, those of the array.
     unsafe { v128_store(to.as_mut_ptr().cast(), bytes) };
     to
 }
 
 #[inline(always)]
 fn integers(from: &[i32; 4]) -> v128 {
-    // SAFETY: see above.
+    // SAFETY: it reads 16 bytes, those of the array.
     unsafe { v128_load(from.as_ptr().cast()) }
 }

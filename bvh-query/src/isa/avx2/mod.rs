@@ -1,10 +1,9 @@
 //! The AVX2 backend: two registers of 8 lanes hold 16 lanes, and an SSE register holds 4.
 //!
-//! All `unsafe` here rests on one fact: only `detect` creates an `Avx2`, after it has found the features below on
-//! the CPU, and a `Y`, `X` or `D` can be made only with an `Avx2`, or a `D` with an `Avx512`.
+//! Each use of an intrinsic names its [`Proof`]: a value that exists only where the CPU has been found to have the features.
 
 use super::corners::Corners;
-use super::{Isa, Lanes, Part, Task, rows_at};
+use super::{Isa, Lanes, Part, Task, halves, rows_at};
 use bvh_format::slabs::Group;
 use bvh_format::treelet::SHORT_CODES;
 use std::arch::x86_64::*;
@@ -24,6 +23,36 @@ pub(crate) struct X(__m128);
 /// Four lanes of `f64`, for three corners.
 #[derive(Clone, Copy)]
 pub(crate) struct D(__m256d);
+
+/// A value of this type shows that the CPU has all features of this backend.
+///
+/// # Safety
+/// A value must be made only where there is another proof, or by `detect`, which has found the features.
+pub(super) unsafe trait Proof: Copy {}
+
+// SAFETY: only `detect` makes it.
+unsafe impl Proof for Avx2 {}
+// SAFETY: its registers are private to this file, where each function that makes one has a proof.
+unsafe impl Proof for Y {}
+// SAFETY: as for `Y`.
+unsafe impl Proof for X {}
+// SAFETY: as for `Y`. An `Avx512`, with which some are made, is a proof as well.
+unsafe impl Proof for D {}
+
+loads! {
+    load_four([f32; 4]) -> __m128 = _mm_loadu_ps;
+    load_eight([f32; 8]) -> __m256 = _mm256_loadu_ps;
+    load_eight_of_bytes([u8; 32]) -> __m256 = _mm256_loadu_ps;
+    load_bytes([u8; 16]) -> __m128i = _mm_loadu_si128;
+    load_integers([i32; 8]) -> __m256i = _mm256_loadu_si256;
+    load_bits([f32; 8]) -> __m256i = _mm256_loadu_si256;
+}
+
+stores! {
+    store_four(__m128) -> [f32; 4] = _mm_storeu_ps;
+    store_eight(__m256) -> [f32; 8] = _mm256_storeu_ps;
+    store_doubles(__m256d) -> [f64; 4] = _mm256_storeu_pd;
+}
 
 impl Avx2 {
     /// Returns the token if the CPU has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
@@ -64,32 +93,32 @@ impl Lanes for Y {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        with_features!({
+        with_features!(self, {
             let sign = _mm256_set1_ps(-0.0);
             Self(_mm256_andnot_ps(sign, self.0), _mm256_andnot_ps(sign, self.1))
         })
     }
     #[inline(always)]
     fn le(self, other: Self) -> Y {
-        with_features!(Y(
-            _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0),
-            _mm256_cmp_ps::<_CMP_LE_OQ>(self.1, other.1)
-        ))
+        with_features!(
+            self,
+            Y(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0), _mm256_cmp_ps::<_CMP_LE_OQ>(self.1, other.1))
+        )
     }
     #[inline(always)]
     fn lt(self, other: Self) -> Y {
-        with_features!(Y(
-            _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0),
-            _mm256_cmp_ps::<_CMP_LT_OQ>(self.1, other.1)
-        ))
+        with_features!(
+            self,
+            Y(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0), _mm256_cmp_ps::<_CMP_LT_OQ>(self.1, other.1))
+        )
     }
     #[inline(always)]
     fn select(mask: Y, yes: Self, no: Self) -> Self {
-        with_features!(Y(_mm256_blendv_ps(no.0, yes.0, mask.0), _mm256_blendv_ps(no.1, yes.1, mask.1)))
+        with_features!(yes, Y(_mm256_blendv_ps(no.0, yes.0, mask.0), _mm256_blendv_ps(no.1, yes.1, mask.1)))
     }
     #[inline(always)]
     fn bits(mask: Y) -> u16 {
-        with_features!((_mm256_movemask_ps(mask.0) | _mm256_movemask_ps(mask.1) << 8) as u16)
+        with_features!(mask, (_mm256_movemask_ps(mask.0) | _mm256_movemask_ps(mask.1) << 8) as u16)
     }
 }
 
@@ -110,34 +139,31 @@ impl Lanes for X {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(with_features!(_mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
+        Self(with_features!(self, _mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> X {
-        X(with_features!(_mm_cmple_ps(self.0, other.0)))
+        X(with_features!(self, _mm_cmple_ps(self.0, other.0)))
     }
     #[inline(always)]
     fn lt(self, other: Self) -> X {
-        X(with_features!(_mm_cmplt_ps(self.0, other.0)))
+        X(with_features!(self, _mm_cmplt_ps(self.0, other.0)))
     }
     #[inline(always)]
     fn select(mask: X, yes: Self, no: Self) -> Self {
-        Self(with_features!(_mm_blendv_ps(no.0, yes.0, mask.0)))
+        Self(with_features!(yes, _mm_blendv_ps(no.0, yes.0, mask.0)))
     }
     #[inline(always)]
     fn bits(mask: X) -> u16 {
-        with_features!(_mm_movemask_ps(mask.0) as u16)
+        with_features!(mask, _mm_movemask_ps(mask.0) as u16)
     }
 }
 
 impl D {
     /// Makes a register of three numbers.
-    ///
-    /// # Safety
-    /// The CPU has AVX2: the caller has an `Avx2` or an `Avx512`.
     #[inline(always)]
-    pub(crate) unsafe fn new([x, y, z]: [f64; 3]) -> Self {
-        Self(with_features!(_mm256_setr_pd(x, y, z, z)))
+    pub(super) fn new(proof: impl Proof, [x, y, z]: [f64; 3]) -> Self {
+        Self(with_features!(proof, _mm256_setr_pd(x, y, z, z)))
     }
 }
 
@@ -155,30 +181,31 @@ impl Corners for D {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(with_features!(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
+        Self(with_features!(self, _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
     }
     #[inline(always)]
     fn lt(self, other: Self) -> D {
-        Self(with_features!(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)))
+        Self(with_features!(self, _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)))
     }
     #[inline(always)]
     fn and(mask: D, other: D) -> D {
-        Self(with_features!(_mm256_and_pd(mask.0, other.0)))
+        Self(with_features!(mask, _mm256_and_pd(mask.0, other.0)))
     }
     #[inline(always)]
     fn select(mask: D, yes: Self, no: Self) -> Self {
-        Self(with_features!(_mm256_blendv_pd(no.0, yes.0, mask.0)))
+        Self(with_features!(yes, _mm256_blendv_pd(no.0, yes.0, mask.0)))
     }
     #[inline(always)]
     fn of(&self, corner: usize) -> f64 {
-        // A register in memory is its lanes, one after another.
+        const { assert!(size_of::<__m256d>() == size_of::<[f64; 4]>()) };
         let lanes = std::ptr::from_ref(&self.0).cast::<[f64; 4]>();
-        with_features!((*lanes)[corner & 3])
+        // SAFETY: a register in memory is its lanes, one after another, and aligned to more than they are.
+        unsafe { (*lanes)[corner & 3] }
     }
     #[inline(always)]
     fn all(self) -> [f64; 3] {
         let mut lanes = [0.0; 4];
-        with_features!(_mm256_storeu_pd(lanes.as_mut_ptr(), self.0));
+        store_doubles(self, self.0, &mut lanes);
         let [x, y, z, _] = lanes;
         [x, y, z]
     }
@@ -192,27 +219,28 @@ impl Isa for Avx2 {
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> D {
-        with_features!(D::new(from))
+        D::new(self, from)
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Y {
-        with_features!(Y(_mm256_set1_ps(value), _mm256_set1_ps(value)))
+        with_features!(self, Y(_mm256_set1_ps(value), _mm256_set1_ps(value)))
     }
     #[inline(always)]
     fn load(self, from: &[f32; 16]) -> Y {
-        with_features!(Y(_mm256_loadu_ps(from.as_ptr()), _mm256_loadu_ps(from.as_ptr().add(8))))
+        let [low, high] = halves(from);
+        Y(load_eight(self, low), load_eight(self, high))
     }
     #[inline(always)]
     fn store(self, value: Y, to: &mut [f32; 16]) {
-        with_features!({
-            _mm256_storeu_ps(to.as_mut_ptr(), value.0);
-            _mm256_storeu_ps(to.as_mut_ptr().add(8), value.1);
-        })
+        let ([low, high], []) = to.as_chunks_mut() else { unreachable!("two halves") };
+        store_eight(self, value.0, low);
+        store_eight(self, value.1, high);
     }
     #[inline(always)]
     fn repeat(self, from: &[f32; 4]) -> Y {
-        with_features!({
-            let both = _mm256_broadcast_ps(&_mm_loadu_ps(from.as_ptr()));
+        let four = load_four(self, from);
+        with_features!(self, {
+            let both = _mm256_broadcast_ps(&four);
             let low = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1);
             let high = _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3);
             Y(permute_in_halves(both, low), permute_in_halves(both, high))
@@ -220,20 +248,19 @@ impl Isa for Avx2 {
     }
     #[inline(always)]
     fn tile(self, from: &[f32; 4]) -> Y {
-        with_features!({
-            let both = _mm256_broadcast_ps(&_mm_loadu_ps(from.as_ptr()));
-            Y(both, both)
-        })
+        let four = load_four(self, from);
+        let both = with_features!(self, _mm256_broadcast_ps(&four));
+        Y(both, both)
     }
     #[inline(always)]
     fn quads(self, from: [&[f32; 4]; 4]) -> Y {
         let [a, b, c, d] =
             [self.load4(from[0]), self.load4(from[1]), self.load4(from[2]), self.load4(from[3])];
-        with_features!(Y(_mm256_set_m128(b.0, a.0), _mm256_set_m128(d.0, c.0)))
+        with_features!(self, Y(_mm256_set_m128(b.0, a.0), _mm256_set_m128(d.0, c.0)))
     }
     #[inline(always)]
     fn quad_splat(self, value: Y, column: usize) -> Y {
-        with_features!({
+        with_features!(self, {
             let places = _mm256_set1_epi32(column as i32);
             Y(_mm256_permutevar_ps(value.0, places), _mm256_permutevar_ps(value.1, places))
         })
@@ -249,78 +276,76 @@ impl Isa for Avx2 {
     }
     #[inline(always)]
     fn round_step_up(self, step: Y) -> Y {
-        with_features!(Y(round_up_half_register(step.0), round_up_half_register(step.1)))
+        with_features!(self, Y(round_up_half_register(step.0), round_up_half_register(step.1)))
     }
     #[inline(always)]
     fn codes_u8(self, from: &[u8; 16]) -> Y {
-        with_features!(bytes_to_lanes(_mm_loadu_si128(from.as_ptr().cast())))
+        let bytes = load_bytes(self, from);
+        with_features!(self, bytes_to_lanes(bytes))
     }
     #[inline(always)]
     fn codes_low(self, from: &[u8; 16]) -> Y {
-        with_features!({
-            let bytes = _mm_loadu_si128(from.as_ptr().cast());
-            bytes_to_lanes(_mm_and_si128(bytes, _mm_set1_epi8(15)))
-        })
+        let bytes = load_bytes(self, from);
+        with_features!(self, bytes_to_lanes(_mm_and_si128(bytes, _mm_set1_epi8(15))))
     }
     #[inline(always)]
     fn codes_high(self, from: &[u8; 16]) -> Y {
-        with_features!({
-            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+        let bytes = load_bytes(self, from);
+        with_features!(self, {
+            let bytes = _mm_srli_epi16::<4>(bytes);
             bytes_to_lanes(_mm_and_si128(bytes, _mm_set1_epi8(15)))
         })
     }
     #[inline(always)]
     fn short_codes_low(self, from: &[u8; 16]) -> Y {
-        with_features!(bytes_to_lanes(short_codes(_mm_loadu_si128(from.as_ptr().cast()))))
+        let bytes = load_bytes(self, from);
+        with_features!(self, bytes_to_lanes(short_codes(bytes)))
     }
     #[inline(always)]
     fn short_codes_high(self, from: &[u8; 16]) -> Y {
-        with_features!({
-            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
-            bytes_to_lanes(short_codes(bytes))
-        })
+        let bytes = load_bytes(self, from);
+        with_features!(self, bytes_to_lanes(short_codes(_mm_srli_epi16::<4>(bytes))))
     }
     #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Y {
-        with_features!(Y(
-            _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().cast())),
-            _mm256_cvtph_ps(_mm_loadu_si128(from.as_ptr().add(16).cast()))
-        ))
+        let [low, high] = halves(from);
+        let (low, high) = (load_bytes(self, low), load_bytes(self, high));
+        with_features!(self, Y(_mm256_cvtph_ps(low), _mm256_cvtph_ps(high)))
     }
     #[inline(always)]
     fn codes_f32(self, from: &[u8; 64]) -> Y {
-        with_features!(Y(
-            _mm256_loadu_ps(from.as_ptr().cast()),
-            _mm256_loadu_ps(from.as_ptr().add(32).cast())
-        ))
+        let [low, high] = halves(from);
+        Y(load_eight_of_bytes(self, low), load_eight_of_bytes(self, high))
     }
     #[inline(always)]
     fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Y {
-        let halves = integers.as_chunks::<8>().0;
-        Y(coordinates_of_eight(&halves[0], unit), coordinates_of_eight(&halves[1], unit))
+        let [low, high] = halves(integers);
+        Y(coordinates_of_eight(self, low, unit), coordinates_of_eight(self, high, unit))
     }
     #[inline(always)]
     fn permute(self, value: Y, places: &[u8; 16]) -> Y {
-        with_features!({
-            let places = _mm_loadu_si128(places.as_ptr().cast());
+        let places = load_bytes(self, places);
+        with_features!(self, {
             Y(pick_eight(value, places), pick_eight(value, _mm_unpackhi_epi64(places, places)))
         })
     }
     #[inline(always)]
     fn splat4(self, value: f32) -> X {
-        X(with_features!(_mm_set1_ps(value)))
+        X(with_features!(self, _mm_set1_ps(value)))
     }
     #[inline(always)]
     fn load4(self, from: &[f32; 4]) -> X {
-        X(with_features!(_mm_loadu_ps(from.as_ptr())))
+        X(load_four(self, from))
     }
     #[inline(always)]
     fn store4(self, value: X, to: &mut [f32; 4]) {
-        with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
+        store_four(self, value.0, to);
     }
     #[inline(always)]
     fn least(self, of: &[f32; 16], mask: u16) -> u32 {
-        with_features!({
+        let [low_of, high_of] = halves(of);
+        let (first, last) = (load_eight(self, low_of), load_eight(self, high_of));
+        with_features!(self, {
             // All ones in the lanes whose bits are set.
             let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
             let lanes = |mask: u16| {
@@ -329,8 +354,8 @@ impl Isa for Avx2 {
             };
             let (low, high) = (lanes(mask & 0xff), lanes(mask >> 8));
             let infinity = _mm256_set1_ps(f32::INFINITY);
-            let first = _mm256_blendv_ps(infinity, _mm256_loadu_ps(of.as_ptr()), low);
-            let last = _mm256_blendv_ps(infinity, _mm256_loadu_ps(of.as_ptr().add(8)), high);
+            let first = _mm256_blendv_ps(infinity, first, low);
+            let last = _mm256_blendv_ps(infinity, last, high);
             let least = _mm256_min_ps(first, last);
             let least = _mm256_min_ps(least, _mm256_permute2f128_ps::<1>(least, least));
             let least = _mm256_min_ps(least, _mm256_shuffle_ps::<0b01_00_11_10>(least, least));
@@ -342,11 +367,13 @@ impl Isa for Avx2 {
     }
     #[inline(always)]
     fn nearest(self, of: &[f32; 16], mask: u16) -> i32 {
-        with_features!({
+        let [first, last] = halves(of);
+        let (first, last) = (load_bits(self, first), load_bits(self, last));
+        with_features!(self, {
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let first = keys(_mm256_loadu_si256(of.as_ptr().cast()), lanes, mask & 0xff);
+            let first = keys(self, first, lanes, mask & 0xff);
             let lanes = _mm256_setr_epi32(8, 9, 10, 11, 12, 13, 14, 15);
-            let last = keys(_mm256_loadu_si256(of.as_ptr().add(8).cast()), lanes, mask >> 8);
+            let last = keys(self, last, lanes, mask >> 8);
             let half = _mm256_min_epi32(first, last);
             let four = _mm_min_epi32(_mm256_castsi256_si128(half), _mm256_extracti128_si256::<1>(half));
             let two = _mm_min_epi32(four, _mm_shuffle_epi32::<0b01_00_11_10>(four));
@@ -356,7 +383,8 @@ impl Isa for Avx2 {
     }
     #[inline(always)]
     fn prefetch_line(self, byte: &u8) {
-        with_features!(_mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(byte).cast()));
+        // SAFETY: the hint changes nothing, wherever it points, and every CPU of this kind has it.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(byte).cast()) };
     }
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
@@ -412,7 +440,7 @@ fn bytes_to_lanes(bytes: __m128i) -> Y {
 /// The lanes of a value at the places in the first eight bytes of `places`.
 #[inline(always)]
 fn pick_eight(value: Y, places: __m128i) -> __m256 {
-    with_features!({
+    with_features!(value, {
         let places = _mm256_cvtepu8_epi32(places);
         let low = _mm256_permutevar8x32_ps(value.0, places);
         let high = _mm256_permutevar8x32_ps(value.1, places);
@@ -423,9 +451,9 @@ fn pick_eight(value: Y, places: __m128i) -> __m256 {
 
 /// What `coordinates` returns for eight integers.
 #[inline(always)]
-fn coordinates_of_eight(integers: &[i32; 8], unit: Option<f64>) -> __m256 {
-    with_features!({
-        let integers = _mm256_loadu_si256(integers.as_ptr().cast());
+fn coordinates_of_eight(isa: Avx2, integers: &[i32; 8], unit: Option<f64>) -> __m256 {
+    let integers = load_integers(isa, integers);
+    with_features!(isa, {
         match unit {
             None => {
                 let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
@@ -444,8 +472,8 @@ fn coordinates_of_eight(integers: &[i32; 8], unit: Option<f64>) -> __m256 {
 
 /// The keys of `nearest` for eight numbers, the largest integer where bits are not set.
 #[inline(always)]
-fn keys(bits: __m256i, lanes: __m256i, mask: u16) -> __m256i {
-    with_features!({
+fn keys(isa: Avx2, bits: __m256i, lanes: __m256i, mask: u16) -> __m256i {
+    with_features!(isa, {
         let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
         let sign = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(bits));
         let keys = _mm256_and_si256(_mm256_xor_si256(bits, sign), _mm256_set1_epi32(!15));

@@ -1,9 +1,8 @@
 //! The AVX-512 backend: one register holds 16 lanes, and an SSE register holds 4.
 //!
-//! All `unsafe` here rests on one fact: only `detect` creates an `Avx512`, after it has found the features below on
-//! the CPU, and a `Z` or `X` can be made only with an `Avx512`.
+//! Each use of an intrinsic names its [`Proof`]: a value that exists only where the CPU has been found to have the features.
 
-use super::avx2::{D, short_codes};
+use super::avx2::{self, D, short_codes};
 use super::{Isa, Lanes, Part, Task};
 use bvh_format::slabs::Group;
 use std::arch::x86_64::*;
@@ -19,6 +18,38 @@ pub(crate) struct Z(__m512);
 /// Four lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct X(__m128);
+
+/// A value of this type shows that the CPU has all features of this backend.
+///
+/// # Safety
+/// A value must be made only where there is another proof, or by `detect`, which has found the features.
+unsafe trait Proof: Copy {}
+
+// SAFETY: only `detect` makes it.
+unsafe impl Proof for Avx512 {}
+// SAFETY: its register is private to this file, where each function that makes one has a proof.
+unsafe impl Proof for Z {}
+// SAFETY: as for `Z`.
+unsafe impl Proof for X {}
+// SAFETY: only `detect` makes it, which has found all features of the other backend, too.
+unsafe impl avx2::Proof for Avx512 {}
+
+loads! {
+    load_four([f32; 4]) -> __m128 = _mm_loadu_ps;
+    load_sixteen([f32; 16]) -> __m512 = _mm512_loadu_ps;
+    load_sixteen_of_bytes([u8; 64]) -> __m512 = _mm512_loadu_ps;
+    load_bytes([u8; 16]) -> __m128i = _mm_loadu_si128;
+    load_halves([u8; 32]) -> __m256i = _mm256_loadu_si256;
+    load_integers([i32; 16]) -> __m512i = _mm512_loadu_si512;
+    load_words([u32; 16]) -> __m512i = _mm512_loadu_si512;
+    load_bits([f32; 16]) -> __m512i = _mm512_loadu_si512;
+}
+
+stores! {
+    store_four(__m128) -> [f32; 4] = _mm_storeu_ps;
+    store_sixteen(__m512) -> [f32; 16] = _mm512_storeu_ps;
+    store_words(__m512i) -> [u32; 16] = _mm512_storeu_si512;
+}
 
 impl Avx512 {
     /// Returns the token if the CPU has AVX-512 F, VL, DQ and BW, AVX2, FMA, F16C, BMI1, BMI2, LZCNT and
@@ -64,19 +95,19 @@ impl Lanes for Z {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(with_features!(_mm512_abs_ps(self.0)))
+        Self(with_features!(self, _mm512_abs_ps(self.0)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> __mmask16 {
-        with_features!(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
+        with_features!(self, _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
     }
     #[inline(always)]
     fn lt(self, other: Self) -> __mmask16 {
-        with_features!(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
+        with_features!(self, _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
     }
     #[inline(always)]
     fn select(mask: __mmask16, yes: Self, no: Self) -> Self {
-        Self(with_features!(_mm512_mask_blend_ps(mask, no.0, yes.0)))
+        Self(with_features!(yes, _mm512_mask_blend_ps(mask, no.0, yes.0)))
     }
     #[inline(always)]
     fn bits(mask: __mmask16) -> u16 {
@@ -101,19 +132,19 @@ impl Lanes for X {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self(with_features!(_mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
+        Self(with_features!(self, _mm_andnot_ps(_mm_set1_ps(-0.0), self.0)))
     }
     #[inline(always)]
     fn le(self, other: Self) -> __mmask8 {
-        with_features!(_mm_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
+        with_features!(self, _mm_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0))
     }
     #[inline(always)]
     fn lt(self, other: Self) -> __mmask8 {
-        with_features!(_mm_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
+        with_features!(self, _mm_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0))
     }
     #[inline(always)]
     fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
-        Self(with_features!(_mm_mask_blend_ps(mask, no.0, yes.0)))
+        Self(with_features!(yes, _mm_mask_blend_ps(mask, no.0, yes.0)))
     }
     #[inline(always)]
     fn bits(mask: __mmask8) -> u16 {
@@ -131,47 +162,49 @@ impl Isa for Avx512 {
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> D {
-        with_features!(D::new(from))
+        D::new(self, from)
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Z {
-        Z(with_features!(_mm512_set1_ps(value)))
+        Z(with_features!(self, _mm512_set1_ps(value)))
     }
     #[inline(always)]
     fn load(self, from: &[f32; 16]) -> Z {
-        Z(with_features!(_mm512_loadu_ps(from.as_ptr())))
+        Z(load_sixteen(self, from))
     }
     #[inline(always)]
     fn store(self, value: Z, to: &mut [f32; 16]) {
-        with_features!(_mm512_storeu_ps(to.as_mut_ptr(), value.0))
+        store_sixteen(self, value.0, to)
     }
     #[inline(always)]
     fn repeat(self, from: &[f32; 4]) -> Z {
-        Z(with_features!({
+        let four = load_four(self, from);
+        Z(with_features!(self, {
             let each = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
-            _mm512_permutexvar_ps(each, _mm512_castps128_ps512(_mm_loadu_ps(from.as_ptr())))
+            _mm512_permutexvar_ps(each, _mm512_castps128_ps512(four))
         }))
     }
     #[inline(always)]
     fn tile(self, from: &[f32; 4]) -> Z {
-        Z(with_features!(_mm512_broadcast_f32x4(_mm_loadu_ps(from.as_ptr()))))
+        let four = load_four(self, from);
+        Z(with_features!(self, _mm512_broadcast_f32x4(four)))
     }
     #[inline(always)]
     fn quads(self, from: [&[f32; 4]; 4]) -> Z {
-        Z(with_features!({
-            let [a, b, c, d] = [
-                _mm_loadu_ps(from[0].as_ptr()),
-                _mm_loadu_ps(from[1].as_ptr()),
-                _mm_loadu_ps(from[2].as_ptr()),
-                _mm_loadu_ps(from[3].as_ptr()),
-            ];
+        let [a, b, c, d] = [
+            load_four(self, from[0]),
+            load_four(self, from[1]),
+            load_four(self, from[2]),
+            load_four(self, from[3]),
+        ];
+        Z(with_features!(self, {
             let (low, high) = (_mm256_set_m128(b, a), _mm256_set_m128(d, c));
             _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high)
         }))
     }
     #[inline(always)]
     fn quad_splat(self, value: Z, column: usize) -> Z {
-        Z(with_features!(_mm512_permutevar_ps(value.0, _mm512_set1_epi32(column as i32))))
+        Z(with_features!(self, _mm512_permutevar_ps(value.0, _mm512_set1_epi32(column as i32))))
     }
     #[inline(always)]
     fn rows(self, group: &Group) -> [[Z; 2]; 4] {
@@ -184,18 +217,19 @@ impl Isa for Avx512 {
     /// Element `4 * i + j` is four times the place of row i in its part, plus j.
     #[inline(always)]
     fn places(self, rows: &[u32; 16], to: &mut [[u32; 16]; 4]) {
-        with_features!({
-            let rows = _mm512_loadu_si512(rows.as_ptr().cast());
-            // (rows >> 3) & 60
-            let firsts = _mm512_and_si512(_mm512_srli_epi32::<3>(rows), _mm512_set1_epi32(60));
-            for (four, to) in to.iter_mut().enumerate() {
+        let rows = load_words(self, rows);
+        // (rows >> 3) & 60
+        let firsts =
+            with_features!(self, _mm512_and_si512(_mm512_srli_epi32::<3>(rows), _mm512_set1_epi32(60)));
+        for (four, to) in to.iter_mut().enumerate() {
+            let places = with_features!(self, {
                 let of = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
                 let of = _mm512_or_si512(of, _mm512_set1_epi32(4 * four as i32));
                 let lanes = _mm512_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
-                let places = _mm512_or_si512(_mm512_permutexvar_epi32(of, firsts), lanes);
-                _mm512_storeu_si512(to.as_mut_ptr().cast(), places);
-            }
-        });
+                _mm512_or_si512(_mm512_permutexvar_epi32(of, firsts), lanes)
+            });
+            store_words(self, places, to);
+        }
     }
     #[inline(always)]
     fn pick(self, [axes, cube, faces, more]: &[[Z; 2]; 4], part: Part, at: &[u32; 16]) -> (Z, Z) {
@@ -203,10 +237,8 @@ impl Isa for Avx512 {
             Part::Axes => self.pick_of(axes, at),
             Part::Cube => self.pick_of(cube, at),
             Part::Faces => {
-                let is_more = with_features!({
-                    let at = _mm512_loadu_si512(at.as_ptr().cast());
-                    _mm512_test_epi32_mask(at, _mm512_set1_epi32(32))
-                });
+                let words = load_words(self, at);
+                let is_more = with_features!(self, _mm512_test_epi32_mask(words, _mm512_set1_epi32(32)));
                 let ((end, other), (end_2, other_2)) = (self.pick_of(faces, at), self.pick_of(more, at));
                 (Z::select(is_more, end_2, end), Z::select(is_more, other_2, other))
             }
@@ -214,94 +246,92 @@ impl Isa for Avx512 {
     }
     #[inline(always)]
     fn round_step_up(self, step: Z) -> Z {
-        Z(with_features!({
+        Z(with_features!(self, {
             let bits = _mm512_add_epi32(_mm512_castps_si512(step.0), _mm512_set1_epi32(0xff));
             _mm512_castsi512_ps(_mm512_and_si512(bits, _mm512_set1_epi32(!0xff)))
         }))
     }
     #[inline(always)]
     fn codes_u8(self, from: &[u8; 16]) -> Z {
-        Z(with_features!({
-            let bytes = _mm_loadu_si128(from.as_ptr().cast());
-            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes))
-        }))
+        let bytes = load_bytes(self, from);
+        Z(with_features!(self, _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes))))
     }
     #[inline(always)]
     fn codes_low(self, from: &[u8; 16]) -> Z {
-        Z(with_features!({
-            let bytes = _mm_loadu_si128(from.as_ptr().cast());
+        let bytes = load_bytes(self, from);
+        Z(with_features!(
+            self,
             _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_and_si128(bytes, _mm_set1_epi8(15))))
-        }))
+        ))
     }
     #[inline(always)]
     fn codes_high(self, from: &[u8; 16]) -> Z {
-        Z(with_features!({
-            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+        let bytes = load_bytes(self, from);
+        Z(with_features!(self, {
+            let bytes = _mm_srli_epi16::<4>(bytes);
             _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_and_si128(bytes, _mm_set1_epi8(15))))
         }))
     }
     #[inline(always)]
     fn short_codes_low(self, from: &[u8; 16]) -> Z {
-        Z(with_features!({
-            let codes = short_codes(_mm_loadu_si128(from.as_ptr().cast()));
-            _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(codes))
-        }))
+        let bytes = load_bytes(self, from);
+        Z(with_features!(self, _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(short_codes(bytes)))))
     }
     #[inline(always)]
     fn short_codes_high(self, from: &[u8; 16]) -> Z {
-        Z(with_features!({
-            let bytes = _mm_srli_epi16::<4>(_mm_loadu_si128(from.as_ptr().cast()));
+        let bytes = load_bytes(self, from);
+        Z(with_features!(self, {
+            let bytes = _mm_srli_epi16::<4>(bytes);
             _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(short_codes(bytes)))
         }))
     }
     #[inline(always)]
     fn codes_f16(self, from: &[u8; 32]) -> Z {
-        Z(with_features!(_mm512_cvtph_ps(_mm256_loadu_si256(from.as_ptr().cast()))))
+        let halves = load_halves(self, from);
+        Z(with_features!(self, _mm512_cvtph_ps(halves)))
     }
     #[inline(always)]
     fn codes_f32(self, from: &[u8; 64]) -> Z {
-        Z(with_features!(_mm512_loadu_ps(from.as_ptr().cast())))
+        Z(load_sixteen_of_bytes(self, from))
     }
     #[inline(always)]
     fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Z {
-        with_features!({
-            let integers = _mm512_loadu_si512(integers.as_ptr().cast());
-            let low = coordinates_of_eight(_mm512_castsi512_si256(integers), unit);
-            let high = coordinates_of_eight(_mm512_extracti64x4_epi64::<1>(integers), unit);
+        let integers = load_integers(self, integers);
+        with_features!(self, {
+            let low = coordinates_of_eight(self, _mm512_castsi512_si256(integers), unit);
+            let high = coordinates_of_eight(self, _mm512_extracti64x4_epi64::<1>(integers), unit);
             Z(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
         })
     }
     #[inline(always)]
     fn permute(self, value: Z, places: &[u8; 16]) -> Z {
-        Z(with_features!({
-            let places = _mm512_cvtepu8_epi32(_mm_loadu_si128(places.as_ptr().cast()));
-            _mm512_permutexvar_ps(places, value.0)
-        }))
+        let places = load_bytes(self, places);
+        Z(with_features!(self, _mm512_permutexvar_ps(_mm512_cvtepu8_epi32(places), value.0)))
     }
     #[inline(always)]
     fn splat4(self, value: f32) -> X {
-        X(with_features!(_mm_set1_ps(value)))
+        X(with_features!(self, _mm_set1_ps(value)))
     }
     #[inline(always)]
     fn load4(self, from: &[f32; 4]) -> X {
-        X(with_features!(_mm_loadu_ps(from.as_ptr())))
+        X(load_four(self, from))
     }
     #[inline(always)]
     fn store4(self, value: X, to: &mut [f32; 4]) {
-        with_features!(_mm_storeu_ps(to.as_mut_ptr(), value.0))
+        store_four(self, value.0, to);
     }
     #[inline(always)]
     fn least(self, of: &[f32; 16], mask: u16) -> u32 {
-        with_features!({
-            let of = _mm512_loadu_ps(of.as_ptr());
+        let of = load_sixteen(self, of);
+        with_features!(self, {
             let least = _mm512_mask_reduce_min_ps(mask, of);
             _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(mask, of, _mm512_set1_ps(least)).trailing_zeros()
         })
     }
     #[inline(always)]
     fn nearest(self, of: &[f32; 16], mask: u16) -> i32 {
-        with_features!({
-            let bits = _mm512_loadu_si512(of.as_ptr().cast());
+        let bits = load_bits(self, of);
+        with_features!(self, {
             let sign = _mm512_srli_epi32::<1>(_mm512_srai_epi32::<31>(bits));
             let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
             // (bits ^ sign) & !15 | lanes
@@ -317,7 +347,8 @@ impl Isa for Avx512 {
     }
     #[inline(always)]
     fn prefetch_line(self, byte: &u8) {
-        with_features!(_mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(byte).cast()));
+        // SAFETY: the hint changes nothing, wherever it points, and every CPU of this kind has it.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(byte).cast()) };
     }
     fn run<T: Task>(self, task: T) -> T::Output {
         // SAFETY: `self` shows that the CPU has the features that the function enables.
@@ -328,7 +359,7 @@ impl Isa for Avx512 {
 /// Returns the last four lanes of the first register, followed by the first twelve of the second.
 #[inline(always)]
 fn straddle(first: Z, second: Z) -> Z {
-    Z(with_features!({
+    Z(with_features!(first, {
         let (first, second) = (_mm512_castps_si512(first.0), _mm512_castps_si512(second.0));
         _mm512_castsi512_ps(_mm512_alignr_epi32::<12>(second, first))
     }))
@@ -339,8 +370,8 @@ impl Avx512 {
     /// exchanged.
     #[inline(always)]
     fn pick_of(self, [lo, hi]: &[Z; 2], at: &[u32; 16]) -> (Z, Z) {
-        with_features!({
-            let at = _mm512_loadu_si512(at.as_ptr().cast());
+        let at = load_words(self, at);
+        with_features!(self, {
             (Z(_mm512_permutex2var_ps(lo.0, at, hi.0)), Z(_mm512_permutex2var_ps(hi.0, at, lo.0)))
         })
     }
@@ -348,12 +379,15 @@ impl Avx512 {
 
 /// What `coordinates` returns for eight integers.
 #[inline(always)]
-fn coordinates_of_eight(integers: __m256i, unit: Option<f64>) -> __m256 {
-    with_features!(match unit {
-        None => {
-            let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
-            _mm256_castsi256_ps(_mm256_xor_si256(integers, inverted))
+fn coordinates_of_eight(isa: Avx512, integers: __m256i, unit: Option<f64>) -> __m256 {
+    with_features!(
+        isa,
+        match unit {
+            None => {
+                let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
+                _mm256_castsi256_ps(_mm256_xor_si256(integers, inverted))
+            }
+            Some(unit) => _mm512_cvtpd_ps(_mm512_mul_pd(_mm512_cvtepi32_pd(integers), _mm512_set1_pd(unit))),
         }
-        Some(unit) => _mm512_cvtpd_ps(_mm512_mul_pd(_mm512_cvtepi32_pd(integers), _mm512_set1_pd(unit))),
-    })
+    )
 }
