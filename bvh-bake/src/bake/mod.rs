@@ -68,7 +68,7 @@ pub fn to_bytes_with(
     let mut output = Output::Memory(Vec::new());
     let mut report = bake(gatherer, options, provenance, &mut output, begin)?;
     report.seconds = start.map_or(0.0, |start| start.elapsed().as_secs_f64());
-    let Output::Memory(bytes) = output else { return Ok((Vec::new(), report)) };
+    let Output::Memory(bytes) = output else { unreachable!("a bake does not move its output") };
     Ok((bytes, report))
 }
 

@@ -182,8 +182,8 @@ impl Header {
     /// Returns for each coordinate the sum of a size over all fields before its own, and its type.
     fn axes(&self, size: fn(&Field) -> usize) -> [(Kind, usize); 3] {
         AXES.map(|axis| {
-            // The header has been checked: the field is there.
-            let own = self.fields.iter().position(|field| field.name == axis).unwrap_or_default();
+            let own = self.fields.iter().position(|field| field.name == axis);
+            let own = own.expect("a checked header has the field");
             (self.fields[own].kind, self.fields[..own].iter().map(size).sum())
         })
     }

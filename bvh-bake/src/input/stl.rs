@@ -229,7 +229,7 @@ impl Solids for Joined {
         count: usize,
         corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
     ) -> Result<(), Halt> {
-        let Some(object) = self.mesh.objects.last_mut() else { return Ok(()) };
+        let object = self.mesh.objects.last_mut().expect("the solid has begun");
         for place in 0..count {
             let mut triangle = [0; 3];
             for (corner, position) in triangle.iter_mut().zip(corners_of(place)) {
@@ -241,7 +241,7 @@ impl Solids for Joined {
     }
 
     fn end(&mut self) -> Result<(), Halt> {
-        let Some(object) = self.mesh.objects.last_mut() else { return Ok(()) };
+        let object = self.mesh.objects.last_mut().expect("the solid has begun");
         object.triangle_ids = next_ids(&mut self.next_id, object.triangles.len())?;
         Ok(())
     }

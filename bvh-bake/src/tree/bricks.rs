@@ -73,9 +73,9 @@ impl Division<'_> {
         let mut cells = grid.cells();
         if let [cell] = cells[..] {
             // The centres are equal, or too close to tell apart: split into halves in the order of the input.
-            let mut halves = self.halves(triangles, count)?.into_iter();
-            let mut next = || self.divide_stream(halves.next(), &cell.bounds);
-            let (left, right) = (next()?, next()?);
+            let [left, right] = self.halves(triangles, count)?;
+            let left = self.divide_stream(left, &cell.bounds)?;
+            let right = self.divide_stream(right, &cell.bounds)?;
             return Ok(Tree::above(left, right, cell.bounds));
         }
         let mut parts =
@@ -93,18 +93,17 @@ impl Division<'_> {
         drop((grid, parts.of_cell));
         let mut streams = streams.into_iter().zip(&boxes);
         // The parts are numbered in the order of the tree's leaves.
-        tree.replace_leaves(&mut |_| match streams.next() {
-            Some((stream, bounds)) => self.divide_stream(Some(stream), bounds),
-            None => self.divide_stream(None, &Aabb::EMPTY),
+        tree.replace_leaves(&mut |_| {
+            let (stream, bounds) = streams.next().expect("each leaf is a part");
+            self.divide_stream(stream, bounds)
         })
     }
 
     fn divide_stream(
         &mut self,
-        stream: Option<Stream<Triangle>>,
+        stream: Stream<Triangle>,
         bounds: &Aabb,
     ) -> Result<Tree<BrickIndex>, BakeError> {
-        let stream = stream.unwrap_or_else(|| Stream::of_pieces(1));
         if stream.count() <= self.builder.brick as u64 {
             self.bricks.push(stream);
             self.boxes.push(*bounds);
@@ -116,7 +115,7 @@ impl Division<'_> {
     }
 
     /// Returns the first half of the triangles, and the rest.
-    fn halves(&self, triangles: &impl Triangles, count: u64) -> Result<Vec<Stream<Triangle>>, BakeError> {
+    fn halves(&self, triangles: &impl Triangles, count: u64) -> Result<[Stream<Triangle>; 2], BakeError> {
         let half = count / 2;
         let mut firsts = vec![0];
         for part in 0..triangles.parts() {
@@ -129,7 +128,8 @@ impl Division<'_> {
             Ok(Grouped::new(triangles.part(part)?, 2, right))
         };
         distribute(triangles.parts(), make, &mut halves, self.spill, self.tally)?;
-        Ok(halves)
+        let [left, right] = <[_; 2]>::try_from(halves).ok().expect("a stream for each half");
+        Ok([left, right])
     }
 }
 
@@ -319,7 +319,7 @@ mod tests {
             triangles.for_each(|corners| bounds.join(&Aabb::of_triangle(corners)));
             bounds
         };
-        let top = division.divide_stream(Some(all), &bounds_of(&mut corners.iter())).unwrap();
+        let top = division.divide_stream(all, &bounds_of(&mut corners.iter())).unwrap();
         for (brick, bounds) in division.bricks.iter().zip(&division.boxes) {
             for piece in brick.pieces() {
                 let triangles = piece.all().unwrap();

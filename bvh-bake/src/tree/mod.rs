@@ -30,11 +30,9 @@ pub(crate) use boxes::Aabb;
 use boxes::Reference;
 use bricks::Division;
 pub(crate) use bricks::{BrickIndex, Grid};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// The number of triangles in a full leaf packet.
 use bvh_format::leaf::{PACKET, order_of_lanes};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard};
 
 /// The shares of two passes over the triangles in the stage's work, in parts of [`WHOLE`]: dividing them into bricks,
 /// and building the bricks' trees. The rest is the encoding.
@@ -129,9 +127,9 @@ impl Bricks {
         resources: &Resources,
     ) -> Result<(&Tree<PacketTriangles>, &[Triangle]), BakeError> {
         let trees = tally(resources, TREES_WEIGHT, self.triangles());
-        // An object has triangles, and so a brick. Of equal bricks, the first one is taken.
+        // Of equal bricks, the first one is taken.
         let largest = (0..self.bricks.len()).rev().max_by_key(|&number| self.bricks[number].count());
-        let number = largest.unwrap_or_default();
+        let number = largest.expect("an object has triangles");
         let brick = std::mem::replace(&mut self.bricks[number], Stream::of_pieces(1));
         let (tree, triangles) = self.builder.tree_of_brick(brick, &trees)?;
         let (_, tree, triangles) = self.first.insert((number, tree, triangles));
@@ -167,15 +165,16 @@ impl Bricks {
         let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
         let tree_of = |number: usize| {
-            let brick = bricks[number].lock().ok().and_then(|mut brick| brick.take());
-            builder.tree_of_brick(brick.unwrap_or_else(|| Stream::of_pieces(1)), &trees)
+            let brick = locked(&bricks[number]).take().expect("each brick is built once");
+            builder.tree_of_brick(brick, &trees)
         };
         let first = Mutex::new(first.map(|(_, tree, triangles)| (tree, triangles)));
         let next = AtomicUsize::new(0);
         let work = || {
             while let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let is_first = Some(number) == first_number;
-                let built = first.lock().ok().filter(|_| is_first).and_then(|mut first| first.take());
+                let built =
+                    is_first.then(|| locked(&first).take().expect("the first brick is passed on once"));
                 let result = built.map_or_else(|| tree_of(number), Ok).and_then(|(tree, triangles)| {
                     let made = make(number, tree, &triangles)?;
                     rest.add(triangles.len() as u64);
@@ -185,17 +184,23 @@ impl Bricks {
                     // The other loops end after their current brick.
                     next.fetch_add(count, Ordering::Relaxed);
                 }
-                if let Ok(mut made) = made[number].lock() {
-                    *made = Some(result);
-                }
+                *locked(&made[number]) = Some(result);
             }
         };
         // One loop per brick that may be in memory. A thread that waits for another may run a second loop, but only loops
         // start bricks.
         threads::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
-        let results = made.into_iter().filter_map(|made| made.into_inner().ok().flatten());
-        Ok((results.collect::<Result<_, _>>()?, top))
+        // Bricks after one that failed are not made.
+        let results = made.into_iter().filter_map(|made| locked(&made).take());
+        let results: Vec<T> = results.collect::<Result<_, _>>()?;
+        assert_eq!(results.len(), count, "every brick is made");
+        Ok((results, top))
     }
+}
+
+/// Locks what threads share. They only put something in or take it out while they hold the lock.
+fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().expect("no thread panics while it holds the lock")
 }
 
 /// Starts a tally of a pass over `triangles` triangles.

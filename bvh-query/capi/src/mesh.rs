@@ -216,7 +216,7 @@ pub unsafe extern "C" fn cbvh_mesh_bytes(
     size: *mut usize,
 ) -> i32 {
     // SAFETY: the header asks for it.
-    ask(mesh, |shape| unsafe { output::bytes(&shape.bytes(), buffer.cast(), capacity, size) })
+    ask(mesh, |shape| unsafe { output::bytes(&shape.bytes()?, buffer.cast(), capacity, size) })
 }
 
 #[unsafe(no_mangle)]
@@ -224,6 +224,6 @@ pub unsafe extern "C" fn cbvh_mesh_save(mesh: MeshHandle, path: *const c_char) -
     ask(mesh, |shape| {
         // SAFETY: the header asks for it.
         let file = unsafe { input::path("path", path) }?;
-        Ok(bvh_bake::write_atomically(&file, &shape.bytes())?)
+        Ok(bvh_bake::write_atomically(&file, &shape.bytes()?)?)
     })
 }

@@ -127,13 +127,14 @@ impl Mesh {
     }
 
     /// The bytes of the file.
-    fn bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.shape.bytes())
+    fn bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.shape.bytes().map_err(query_error)?))
     }
 
     /// Writes the bytes to a file that appears complete or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        detached(py, || write_atomically(&path, &self.shape.bytes())).map_err(bake_error)
+        let bytes = self.shape.bytes().map_err(query_error)?;
+        detached(py, || write_atomically(&path, &bytes)).map_err(bake_error)
     }
 
     /// The number of bytes of the file.

@@ -44,8 +44,10 @@ impl OwnedShape {
 
     /// Returns the shape in the form that questions take.
     pub fn shape(&self) -> Shape<'_> {
-        // The number was checked when the shape was made.
-        let core = self.object.and_then(|number| self.bvh.object(number)).unwrap_or_else(|| self.bvh.all());
+        let core = match self.object {
+            Some(number) => self.bvh.object(number).expect("the number was checked when the shape was made"),
+            None => self.bvh.all(),
+        };
         core.of_valid(self.radius, self.is_solid)
     }
 
@@ -81,14 +83,16 @@ impl OwnedShape {
     /// it that states others for all of its objects. They are solid only if all of them are closed.
     ///
     /// Cost: nothing, or that of copying the file.
-    pub fn bytes(&self) -> Cow<'_, [u8]> {
+    ///
+    /// # Errors
+    /// [`QueryError::Damaged`] if a copy is needed and a mapped file is no longer what it was when it was opened.
+    pub fn bytes(&self) -> Result<Cow<'_, [u8]>, QueryError> {
         let bytes = self.bvh.bytes();
         let is_solid = self.is_solid && self.bvh.all().solid().is_ok();
         if rounding(self.bvh.objects()) == (self.radius, is_solid) {
-            return Cow::Borrowed(bytes);
+            return Ok(Cow::Borrowed(bytes));
         }
-        // The file has been read, and the radius has been checked.
-        with_rounding(bytes, self.radius, is_solid).map_or(Cow::Borrowed(bytes), Cow::Owned)
+        Ok(Cow::Owned(with_rounding(bytes, self.radius, is_solid)?))
     }
 
     /// Returns the file that the shape is in.

@@ -81,7 +81,9 @@ impl TriangleQueue {
     }
 
     pub(crate) fn push(&mut self, local: &Local<'_>, candidate: TrianglePair) {
-        let at = self.len & 15;
+        // It also shows the compiler that no access below is out of bounds.
+        assert!(self.len < Self::FULL, "a full queue is emptied before the next pair");
+        let at = self.len;
         let (lane_a, lane_b) = (usize::from(candidate.lane_a & 3), usize::from(candidate.lane_b & 3));
         for corner in 0..3 {
             for axis in 0..3 {
@@ -147,5 +149,33 @@ impl TriangleQueue {
     pub(crate) fn take(&mut self) -> [Option<TrianglePair>; 16] {
         self.clear();
         self.candidates
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leaf::frame::LocalFrame;
+    use crate::leaf::placed_packet::PlacedPacket;
+
+    const LEAF: LeafPacket = LeafPacket { page: 0, packet: 0, triangles: 4 };
+
+    /// A pair beyond a full queue would take the place of another one, whose contact would be lost.
+    #[test]
+    #[should_panic(expected = "a full queue is emptied before the next pair")]
+    fn a_full_queue_takes_no_more() {
+        let frame = LocalFrame {
+            rotation: [[0.0; 3]; 3],
+            translation: [0.0; 3],
+            rotation32: [[0.0; 3]; 3],
+            scale: 1.0,
+            error: f32::MIN_POSITIVE,
+        };
+        let local = Local::new(&frame, &PlacedPacket::NONE, &PlacedPacket::NONE);
+        let mut queue = TriangleQueue::default();
+        for lane in 0..17 {
+            assert_eq!(queue.len(), usize::from(lane));
+            queue.push(&local, TrianglePair::in_lane(LEAF, LEAF, lane));
+        }
     }
 }

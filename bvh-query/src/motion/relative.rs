@@ -3,13 +3,15 @@
 use crate::motion::RigidPath;
 use crate::motion::linear::{difference, length, norm};
 use crate::pose::Pose;
+use bvh_format::object::MAX_COORDINATE;
 
 /// The path of B in A's frame, given the paths of both in the world. At each time, its pose is the `Pose::relative` of
 /// their poses. [`Scene::motion`](crate::Scene::motion) asks a querier about such paths.
 ///
 /// All poses of both paths must be rigid to within 2^-23, and no translation may exceed 2^118. Within these limits
-/// there is always a relative pose. At a time without one, B counts as unmoved, and the sagitta of an interval that
-/// begins or ends there as infinite.
+/// there is always a relative pose. At a time without one, B counts as farther away than any mesh, and the sagitta of an
+/// interval that begins or ends there as infinite: neither a hit nor free. A question about such a path is refused with
+/// [`NumberError::Unresolved`](crate::NumberError::Unresolved), unless it finds a hit before.
 #[derive(Clone, Copy)]
 pub struct RelativePath<'a> {
     a: &'a dyn RigidPath,
@@ -53,7 +55,8 @@ pub(super) const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
 /// translations first: less than 2^-46 W, for the point and both ends, wherever in the world they are.
 impl RigidPath for RelativePath<'_> {
     fn pose(&self, t: f64) -> Pose {
-        Pose::relative(&self.a.pose(t), &self.b.pose(t)).unwrap_or(Pose::IDENTITY)
+        let far_away = || Pose::of_valid(*Pose::IDENTITY.rotation(), [MAX_COORDINATE, 0.0, 0.0]);
+        Pose::relative(&self.a.pose(t), &self.b.pose(t)).unwrap_or_else(|_| far_away())
     }
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {

@@ -244,7 +244,7 @@ impl Ray {
         // A crossing in the plane whose parameter is not 0 is the first of all.
         let meetings = self.meetings_in_plane(triangle).into_iter().map(|(t, _)| t);
         let first = meetings.min_by(|s, t| s.compare(t));
-        first.unwrap_or(Quotient { numerator: BigInt::ZERO, denominator: 1.into() })
+        first.expect("a line that meets a triangle in a plane with it meets an edge or a corner")
     }
 }
 

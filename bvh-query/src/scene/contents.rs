@@ -37,6 +37,11 @@ impl Contents {
         self.instances.get(place as usize)?.as_ref()
     }
 
+    /// Returns the instance in a place that was found in these contents.
+    pub(super) fn known(&self, place: u32) -> &Instance {
+        self.at(place).expect("a place of an instance")
+    }
+
     /// Returns the instance in a place, if there is one, to change it.
     pub(super) fn at_mut(&mut self, place: u32) -> Option<&mut Instance> {
         self.instances.get_mut(place as usize)?.as_mut()

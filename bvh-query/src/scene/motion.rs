@@ -263,9 +263,7 @@ impl Scene {
                     .near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
             })?;
             for place in near.into_iter().filter(|place| ways.of(*place).is_none()) {
-                let Some(other) = self.contents.at(place) else {
-                    continue;
-                };
+                let other = self.contents.known(place);
                 let still = vec![other.bounds; slices];
                 let pair = [(place, other, still.as_slice()), (one.place, one.instance, &one.slices)];
                 encounters.extend(self.encounter(pair, ways));
@@ -339,7 +337,7 @@ impl Scene {
         let asked = scene.each_piece_of_encounters(ways, &mut |encounters| {
             pairs_asked += encounters.len() as u64;
             let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
-                let Some((one, other)) = scene.instances_at(a, b) else { return Ok(None) };
+                let (one, other) = (scene.contents.known(a), scene.contents.known(b));
                 let relative = RelativePath::new(ways.path(a, one), ways.path(b, other));
                 let together = ways.together(a, b);
                 let path: &dyn RigidPath = together.as_ref().map_or(&relative, |together| together);

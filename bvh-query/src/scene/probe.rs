@@ -246,9 +246,7 @@ impl Asked<'_> {
         let Self { scene, querier } = self;
         let mut order = scene.contents.broad.by_key(&key);
         while let Some((place, key)) = order.next(&scene.contents.broad, || querier.charge_visit())? {
-            let Some(instance) = scene.contents.at(place) else {
-                continue;
-            };
+            let instance = scene.contents.known(place);
             let id = instance.id(place);
             let mut ask = || {
                 let shape = instance.shape.held_open()?;
@@ -268,8 +266,6 @@ impl Asked<'_> {
     }
 
     fn hit(&self, instance: u32, hit: RayHit) -> SceneRayHit {
-        let of = self.scene.contents.at(instance);
-        let instance = of.map_or(InstanceId { place: instance, generation: 0 }, |of| of.id(instance));
-        SceneRayHit { instance, hit }
+        SceneRayHit { instance: self.scene.contents.known(instance).id(instance), hit }
     }
 }

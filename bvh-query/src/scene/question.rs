@@ -9,7 +9,7 @@ use crate::query::options::check_distance;
 use crate::query::querier::Querier;
 use crate::query::tracker::Tracker;
 use crate::scene::broad_phase::NearestFirst;
-use crate::scene::instance::{Instance, InstanceId};
+use crate::scene::instance::InstanceId;
 use crate::scene::{Scene, SceneError};
 use crate::traverse::budget::Budget;
 use std::ops::ControlFlow;
@@ -185,7 +185,7 @@ impl Scene {
         options.check()?;
         let mut all = Vec::new();
         self.each_piece(options.clearance, &mut |scene, mut near_pairs| {
-            near_pairs.retain(|near_pair| scene.ids(near_pair.a, near_pair.b).is_some_and(&is_asked));
+            near_pairs.retain(|near_pair| is_asked(scene.ids(near_pair.a, near_pair.b)));
             all.extend(scene.each(&near_pairs, |querier, pair| {
                 let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
                 Ok((clash.class != ClashClass::Apart).then_some(SceneClash { pair: pair.ids, clash }))
@@ -475,14 +475,14 @@ impl Scene {
     /// Returns a pair of places in order, unless it may touch.
     fn near_pair(&self, x: u32, y: u32, squared_gap: f64) -> Option<NearPair> {
         let (a, b) = (x.min(y), x.max(y));
-        let is_asked = self.contents.at(a).is_some_and(|instance| !instance.allows(b));
-        is_asked.then_some(NearPair { a, b, squared_gap })
+        (!self.contents.known(a).allows(b)).then_some(NearPair { a, b, squared_gap })
     }
 
     /// Returns the pair of the last answer, if it is still asked about.
     fn likely_pair(&self) -> Option<NearPair> {
         let (a, b) = self.likely?;
-        let (first, second) = self.instances_at(a, b)?;
+        // They may have been removed since.
+        let (first, second) = (self.contents.at(a)?, self.contents.at(b)?);
         let squared_gap = first.bounds.squared_gap(&second.bounds);
         (first.groups.meet(second.groups) && !first.allows(b)).then_some(NearPair { a, b, squared_gap })
     }
@@ -523,9 +523,7 @@ impl Scene {
         ask: &mut dyn FnMut(&mut Querier, &mut InstancePair<'_>) -> Result<(), QueryError>,
     ) -> Result<(), QueryError> {
         let &NearPair { a, b, .. } = near_pair;
-        let (Some((one, other)), Some(ids)) = (self.instances_at(a, b), self.ids(a, b)) else {
-            return Ok(());
-        };
+        let (one, other, ids) = (self.contents.known(a), self.contents.known(b), self.ids(a, b));
         let pose = Pose::relative_of_instances(&one.world, &other.world);
         let before = querier.questions();
         let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
@@ -544,21 +542,11 @@ impl Scene {
 
     /// Names the instances in two places, whose question has no answer.
     pub(super) fn error_of(&self, a: u32, b: u32, source: QueryError) -> SceneError {
-        match self.ids(a, b) {
-            Some(pair) => self.pair_error(pair, source),
-            None => source.into(),
-        }
+        self.pair_error(self.ids(a, b), source)
     }
 
     /// Returns the identifiers of the instances in two places.
-    fn ids(&self, a: u32, b: u32) -> Option<ScenePair> {
-        let (one, other) = self.instances_at(a, b)?;
-        Some(ScenePair { a: one.id(a), b: other.id(b) })
-    }
-
-    /// Returns the instances in two places.
-    pub(super) fn instances_at(&self, a: u32, b: u32) -> Option<(&Instance, &Instance)> {
-        let of = |place: u32| self.contents.at(place);
-        Some((of(a)?, of(b)?))
+    fn ids(&self, a: u32, b: u32) -> ScenePair {
+        ScenePair { a: self.contents.known(a).id(a), b: self.contents.known(b).id(b) }
     }
 }

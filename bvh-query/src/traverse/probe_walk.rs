@@ -217,7 +217,9 @@ impl Nodes {
     ) -> Result<Option<u32>, QueryError> {
         let number = if is_kept { self.used as u32 } else { own };
         let places = [node as usize, number as usize];
-        let Ok([parent, to]) = self.nodes.get_disjoint_mut(places) else { return Ok(None) };
+        let Ok([parent, to]) = self.nodes.get_disjoint_mut(places) else {
+            unreachable!("a node is opened into another one")
+        };
         let known = parent.kept[child & 7];
         if known != CLOSED {
             return Ok(Some(known));

@@ -3,7 +3,7 @@
 use crate::common::shapes::{soup, sphere};
 use crate::common::{baked, mesh};
 use bvh_bake::{Options, to_bytes};
-use bvh_query::{Bvh, OpenError, Pose, Querier};
+use bvh_query::{Bvh, OpenError, OwnedShape, Pose, Querier, QueryError};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
@@ -75,6 +75,21 @@ mod on_linux {
         let sanitized = String::from_utf8_lossy(&child.stderr).contains("AddressSanitizer: BUS");
         assert!(child.status.signal() == Some(SIGBUS) || sanitized, "{:?}: {said}", child.status);
     }
+}
+
+/// A shape does not lose its radius on the way into a copy of a file that has changed.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_changed_file_is_not_copied_with_another_radius() {
+    use std::os::unix::fs::FileExt;
+    let (_folder, path) = written(&file(6));
+    let shape = OwnedShape::from(map(&path).unwrap()).rounded(0.5).unwrap();
+    let copy = Bvh::from_bytes(shape.bytes().unwrap().into_owned()).unwrap();
+    assert_eq!(copy.objects()[0].radius(), 0.5);
+    // The checksum of the content, in the header.
+    OpenOptions::new().write(true).open(&path).unwrap().write_all_at(&[0; 8], 24).unwrap();
+    let refused = shape.bytes();
+    assert!(matches!(refused, Err(QueryError::Damaged(_))), "{refused:?}");
 }
 
 #[cfg(windows)]

@@ -79,7 +79,7 @@ impl Files {
             return Ok((number, part));
         }
         // A copy that states another radius may be longer.
-        let bytes = whole.bytes().len() as u64;
+        let bytes = whole.bytes()?.len() as u64;
         if bytes > MAX_FILE_BYTES {
             return Err(PageError::FileTooLarge { name, found: bytes });
         }

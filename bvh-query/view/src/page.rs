@@ -227,7 +227,7 @@ impl Page {
         for file in &self.files.list {
             out.write_all(b"\n<script type=\"text/plain\" class=\"cbvh-file\">")?;
             let mut packed = GzEncoder::new(EncoderWriter::new(&mut out, &STANDARD), Compression::default());
-            packed.write_all(&file.shape.bytes())?;
+            packed.write_all(&file.shape.bytes().map_err(io::Error::other)?)?;
             packed.finish()?.finish()?;
             out.write_all(b"</script>")?;
         }

@@ -26,8 +26,8 @@ impl Mesh {
     }
 
     /// Copies the bytes of the file.
-    pub fn bytes(&self) -> Uint8Array {
-        Uint8Array::from(&self.shape.bytes()[..])
+    pub fn bytes(&self) -> Answer<Uint8Array> {
+        Ok(Uint8Array::from(&self.shape.bytes().map_err(refused)?[..]))
     }
 
     /// The number of bytes of the file.

@@ -95,7 +95,8 @@ impl<'a> Line<'a> {
             grain = grain.min(extent / (shape.triangles() as f64).sqrt());
         }
         magnitude += pose.translation().iter().map(|t| t.abs()).sum::<f64>();
-        let error = POSE_ERROR * (magnitude + size);
+        // Never 0, so that each turn of a search goes on, even for two points in one place.
+        let error = (POSE_ERROR * (magnitude + size)).max(f64::MIN_POSITIVE);
         Self { a, b, pose, direction: [0.0; 3], length: 2.0 * size, radii, error, grain }
     }
 

@@ -52,19 +52,19 @@ fn bytes_state_the_radius_and_the_solidity() {
         bvh_bake::to_bytes(&mesh, &options.split_objects(true)).unwrap().0
     };
     let plain = bvh_query::OwnedShape::from(Bvh::from_bytes(bake(bvh_bake::Options::default())).unwrap());
-    assert!(matches!(plain.bytes(), std::borrow::Cow::Borrowed(_)));
+    assert!(matches!(plain.bytes().unwrap(), std::borrow::Cow::Borrowed(_)));
     let rounded = plain.clone().rounded(0.25).unwrap();
-    assert_eq!(rounded.bytes(), bake(bvh_bake::Options::default().radius(0.25)));
+    assert_eq!(rounded.bytes().unwrap(), bake(bvh_bake::Options::default().radius(0.25)));
     let solid = rounded.solid().unwrap();
-    assert_eq!(solid.bytes(), bake(bvh_bake::Options::default().radius(0.25).solid(true)));
-    let again = bvh_query::OwnedShape::from(Bvh::from_bytes(solid.bytes().into_owned()).unwrap());
+    assert_eq!(solid.bytes().unwrap(), bake(bvh_bake::Options::default().radius(0.25).solid(true)));
+    let again = bvh_query::OwnedShape::from(Bvh::from_bytes(solid.bytes().unwrap().into_owned()).unwrap());
     assert_eq!((again.shape().radius(), again.shape().is_solid()), (0.25, true));
-    assert_eq!(again.rounded(0.0).unwrap().bytes(), bake(bvh_bake::Options::default().solid(true)));
+    assert_eq!(again.rounded(0.0).unwrap().bytes().unwrap(), bake(bvh_bake::Options::default().solid(true)));
     // A file with an open object has no solids, though one of its objects may be one.
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata/ok-topology.cbvh");
     let mixed = Bvh::read(folder).unwrap();
     let one = bvh_query::OwnedShape::object(mixed, 0).unwrap().rounded(0.5).unwrap().solid().unwrap();
-    let saved = Bvh::from_bytes(one.bytes().into_owned()).unwrap();
+    let saved = Bvh::from_bytes(one.bytes().unwrap().into_owned()).unwrap();
     saved.validate().unwrap();
     assert_eq!((saved.all().radius(), saved.all().is_solid()), (0.5, false));
 }
