@@ -44,7 +44,7 @@ pub(crate) struct MotionArguments {
     /// Meshes that are at most this far apart count as a hit, in mesh units
     #[arg(long, value_name = "C", default_value = "0", value_parser = not_negative, allow_negative_numbers = true)]
     clearance: f64,
-    /// How far beyond the clearance the answer may be near, in mesh units [default: 1e-6 of the larger diagonal]
+    /// How far beyond the clearance the answer may be near, in mesh units [default: 1e-6 of the smaller diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     tolerance: Option<f64>,
     #[command(flatten)]

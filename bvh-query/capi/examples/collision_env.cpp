@@ -302,7 +302,7 @@ private:
         if (answer.outcome == CBVH_FREE) {
             return;
         }
-        // What comes within a millionth of its size counts as contact: free means certainly free.
+        // What comes within a millionth of the smaller size counts as contact: free means certainly free.
         result.collision = true;
         const std::string a = prepared.id(robot.name(answer.pair.a)), b = prepared.id(robot.name(answer.pair.b));
         result.contacts[std::minmax(a, b)].push_back({point(answer.nearest.point_a), {0, 0, 0}, 0, a, b, answer.at});

@@ -751,8 +751,8 @@ typedef struct cbvh_motion_options {
     /* Meshes that are at most this far apart count as a hit; 0 for contact. Finite, at least 0. */
     double clearance;
     /* The width of the undecided range beyond the clearance: if B comes that near and is no hit, the answer may be
-     * near. 0 for a millionth of the diagonal of the larger object's box, radius included. A smaller tolerance costs
-     * more. */
+     * near. 0 for a millionth of the diagonal of the smaller object's box, radius included; between a point and a
+     * mesh, of the mesh's. A smaller tolerance costs more. */
     double tolerance;
 } cbvh_motion_options;
 

@@ -142,6 +142,13 @@ class Ways(unittest.TestCase):
         self.assertIs(near.kind, MotionKind.NEAR)
         self.assertTrue(near.free_until <= near.at and 0 < near.nearest.distance < 1e-8)
 
+    def test_the_default_tolerance_is_that_of_the_smaller_mesh(self):
+        falls = cbvh.Motion.between(*shifts((0, 0, 10), (0, 0, -10)))
+        # The ball's middle is at 10 - 20 t. The ground under z = 0 has sides of 1,000.
+        found = cbvh.ground().motion(cbvh.sphere(0.5), falls)
+        self.assertIs(found.kind, MotionKind.HIT)
+        self.assertTrue(found.free_until <= 0.475 <= found.at + 1e-15 and found.at - found.free_until < 1e-6 / 20, found)
+
     def test_many_motions_get_the_answers_of_each(self):
         starts, ends = random_poses(1, 300, 2.5), random_poses(2, 300, 2.5)
         motions = cbvh.Motion.between(starts, ends)

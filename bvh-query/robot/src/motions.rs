@@ -54,8 +54,8 @@ pub enum RobotMotion {
 
 impl Robot {
     /// Returns whether a straight motion in joint space is certainly free, at every moment. `false` means that two bodies touch at
-    /// some moment, or that their gap falls below the tolerance: a millionth of the size of the larger part, unless another one is
-    /// given ([`MotionOptions::tolerance`]).
+    /// some moment, or that their gap falls below the tolerance: a millionth of the size of the smaller part, unless another one is
+    /// given ([`MotionOptions::tolerance_between`]).
     ///
     /// Each joint moves straight in its value: a continuous joint from 3.0 to -3.0 turns by 6 radians, the long way round. For the
     /// short way, ask about the goal that [`Robot::nearest_turns`] returns. A body that is inside a mesh all the way without touching
@@ -165,9 +165,6 @@ const MAX_TURN: f64 = 16384.0;
 const SAMPLES: u32 = 8;
 /// The most intervals that are halved before all of the motion is left to the querier, which keeps fewer intervals in memory.
 const MOST_HALVED: u32 = 1 << 12;
-/// More than what [`MotionOptions`] takes for a tolerance, as a part of the radius of the larger ball: a millionth of a diagonal, which
-/// is at most 2 sqrt(3) radii.
-const DEFAULT_TOLERANCE: f64 = 4e-6;
 
 impl Asker {
     fn is_free(
@@ -210,8 +207,7 @@ impl Asker {
     ) -> Result<bool, QueryError> {
         let (a, b) = (path.a, path.b);
         let size = a.radius.min(b.radius);
-        let limit =
-            options.clearance + options.tolerance.unwrap_or(DEFAULT_TOLERANCE * a.radius.max(b.radius));
+        let limit = options.clearance + options.tolerance_between(&a.shape, &b.shape);
         let mut todo = VecDeque::from([[0.0, until]]);
         let mut halved = 0;
         while let Some([t0, t1]) = todo.pop_front() {

@@ -2,7 +2,7 @@
 
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
-use crate::query::motion::size_of;
+use crate::query::motion::{Measures, radius, size_of};
 use crate::scene::attachments::Attached;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
@@ -53,8 +53,8 @@ pub(super) struct Instance {
     pub(super) margin: f64,
     /// The boxes and spheres of its objects.
     extents: Arc<[Extent]>,
-    /// The largest diagonal of the boxes of its objects, in mesh units.
-    pub(super) size: f64,
+    /// Of its core.
+    pub(super) measures: Measures,
     pub(super) world: Pose,
     pub(super) bounds: WorldBox,
     pub(super) groups: Groups,
@@ -73,7 +73,7 @@ impl Instance {
         world: Pose,
         groups: Groups,
     ) -> Self {
-        let (extents, size) = measures(&shape);
+        let (extents, measures) = measures(&shape);
         let (bounds, allowed, children) = (WorldBox::EMPTY, Vec::new(), Vec::new());
         let (margin, attached) = (0.0, None);
         let mut instance = Self {
@@ -82,7 +82,7 @@ impl Instance {
             shape,
             margin,
             extents,
-            size,
+            measures,
             world,
             bounds,
             groups,
@@ -96,7 +96,7 @@ impl Instance {
 
     /// Replaces its shape. Its box is then out of date.
     pub(super) fn set_shape(&mut self, shape: SceneShape) {
-        (self.extents, self.size) = measures(&shape);
+        (self.extents, self.measures) = measures(&shape);
         self.shape = shape;
     }
 
@@ -110,9 +110,10 @@ impl Instance {
         self.shape.radius() + self.margin
     }
 
-    /// Returns its size and twice its radius with a further margin, in mesh units: the size that questions know.
-    pub(super) fn size_with(&self, margin: f64) -> f64 {
-        self.size + 2.0 * (self.shape.radius() + (self.margin + margin))
+    /// Returns its measures with a further margin, as questions know them.
+    pub(super) fn measures_with(&self, margin: f64) -> Measures {
+        let size = self.measures.size + 2.0 * (self.shape.radius() + (self.margin + margin));
+        Measures { size, ..self.measures }
     }
 
     /// Returns its box in the world at a pose.
@@ -139,8 +140,9 @@ impl Instance {
     }
 }
 
-/// Returns the boxes and spheres of a shape's objects, and its size.
-fn measures(shape: &SceneShape) -> (Arc<[Extent]>, f64) {
+/// Returns the boxes and spheres of a shape's objects, and the measures of its core.
+fn measures(shape: &SceneShape) -> (Arc<[Extent]>, Measures) {
     let objects = shape.objects();
-    (objects.iter().map(Extent::of).collect(), size_of(objects, 0.0))
+    let measures = Measures { size: size_of(objects, 0.0), radius: radius(objects) };
+    (objects.iter().map(Extent::of).collect(), measures)
 }

@@ -11,7 +11,7 @@ use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::motion::{AttachedPath, RelativePath, RigidPath, TogetherPath};
 use crate::query::answers::Distance;
-use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, radius, tolerance};
+use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, default_tolerance};
 use crate::query::querier::Querier;
 use crate::scene::attachments::Table;
 use crate::scene::contents::reach_of;
@@ -243,7 +243,7 @@ impl Scene {
     /// are many. The pairs of a call are in the order in which their boxes come near each other.
     fn each_piece_of_encounters(&self, ways: &Ways<'_>, visit: &mut Visit<'_>) -> Result<(), SceneError> {
         let all = |slices: usize| -> Vec<Moving<'_>> {
-            ways.ways.iter().filter_map(|way| self.moving(way.place, &way.path, slices)).collect()
+            ways.ways.iter().map(|way| self.moving(way.place, &way.path, slices)).collect()
         };
         let mut moving = all(1);
         let slices = moving.iter().map(Moving::slices_worthwhile).max().unwrap_or(1);
@@ -285,10 +285,9 @@ impl Scene {
     }
 
     /// Returns a moving instance with its boxes.
-    fn moving(&self, place: u32, path: WorldPath<'_>, slices: usize) -> Option<Moving<'_>> {
-        let instance = self.contents.at(place)?;
-        let objects = instance.shape.objects();
-        let radius = radius(objects);
+    fn moving(&self, place: u32, path: WorldPath<'_>, slices: usize) -> Moving<'_> {
+        let instance = self.contents.known(place);
+        let radius = instance.measures.radius;
         let time = |end: usize| end as f64 / slices as f64;
         let ends: Vec<WorldBox> = (0..=slices).map(|end| instance.bounds_at(&path.pose(time(end)))).collect();
         let slice = |number: usize| {
@@ -297,7 +296,7 @@ impl Scene {
             ends[number].union(&ends[number + 1]).grown(sagitta)
         };
         let slices = (0..slices).map(slice).collect();
-        Some(Moving { place, instance, girth: ends[0].girth(), slices })
+        Moving { place, instance, girth: ends[0].girth(), slices }
     }
 
     /// Returns when the boxes of two instances first come near each other, if they do and are asked about.
@@ -310,7 +309,8 @@ impl Scene {
             return None;
         }
         let margin = self.contents.margin_of_pair(a, b);
-        let tolerance = tolerance(one.size_with(margin).max(other.size_with(0.0)), ways.options);
+        let default = || default_tolerance(one.measures_with(margin), other.measures_with(0.0));
+        let tolerance = ways.options.tolerance.unwrap_or_else(default);
         let limit = (ways.options.clearance + tolerance + reach_of(margin)).powi(2);
         let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
         let slice = slices.iter().zip(others).position(is_near);
@@ -377,8 +377,9 @@ impl<'a> Ways<'a> {
         (a.given == b.given).then_some(TogetherPath { a: &a.path, b: &b.path })
     }
 
-    /// Returns how far apart the boxes of two instances may be for a question to matter. The diagonal of an object's own box
-    /// is at most the square root of 3 times that of any box around it, and no side of the latter is longer than all.
+    /// Returns how far apart the boxes of two instances may be for a question to matter. The default tolerance is at most a
+    /// millionth of the larger size, or what a part of the boxes' own error covers. The diagonal of an object's own box is at most
+    /// the square root of 3 times that of any box around it, and no side of the latter is longer than all.
     fn limit_by_boxes(&self, one: &WorldBox, other: &WorldBox) -> f64 {
         let default = 2e-6 * one.girth().max(other.girth());
         self.options.clearance + self.options.tolerance.unwrap_or(default)

@@ -4,16 +4,17 @@
 //! pose, its vertices are where B's exact pose puts them, except for roundings. Let u = 2^-53, and let m be the sum,
 //! over both instances, of the magnitudes of the translation and of the box that it places. Entries of the relative
 //! rotation are off by at most 32u (three products with entries of an inverse, 16u each, and 4u: see `pose/frames.rs`),
-//! its translation by 64u m, and a placed vertex by 8u m more. Over three axes that is below 2^-45 m. Each box is
-//! larger by 2^-43 of its own share of m, because computing the box itself loses less than the rest. A's frame may be
-//! stretched against the world by 2^-22, so that squared gaps between boxes are reduced by 2^-19 of themselves: see
-//! `squared_gap`. A relative translation below 2^-213 counts as 0, for which each box is larger by 2^-211.
+//! its translation by 64u m, and a placed vertex by 8u m more. Over three axes that is below 2^-45 m, and computing the box
+//! itself loses less. A motion may look for contact within an eighth of its tolerance, which may be 2^-41 of m where it is
+//! no part of a size. Each box is larger by 2^-40 of its own share of m, more than all of these. A's frame may be stretched
+//! against the world by 2^-22, so that squared gaps between boxes are reduced by 2^-19 of themselves: see `squared_gap`. A
+//! relative translation below 2^-213 counts as 0, for which each box is larger by 2^-211.
 
 use crate::pose::Pose;
 use bvh_format::object::{Object, Volumes};
 
 /// The share of the magnitudes by which a box is enlarged.
-const ERROR: f64 = 1.0 / (1u64 << 43) as f64;
+const ERROR: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// More than a relative translation that counts as 0, 2^-211 mesh units.
 const FLUSHED: f64 = f64::from_bits((1023 - 211) << 52);

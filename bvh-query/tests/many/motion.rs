@@ -9,7 +9,7 @@ use crate::common::{
 use bvh_bake::mesh::Mesh;
 use bvh_query::{
     Bvh, Motion, MotionAnswer, MotionOptions, NumberError, PathError, Polyline, Pose, Querier, QueryError,
-    RigidPath, displacement, path_reach,
+    RelativePath, RigidPath, displacement, path_reach,
 };
 use cbvh_testkit::depth::rounds;
 use std::path::Path;
@@ -313,6 +313,59 @@ fn hard_motions_have_their_answers() {
     assert!(matches!(answer, MotionAnswer::Near { nearest, .. } if nearest.distance <= 1e-2), "{answer:?}");
 }
 
+/// A plate of two triangles with sides of 1,000, at height 0.
+fn floor() -> Bvh {
+    let corner = |x: f64, y: f64| [500.0 * x, 500.0 * y, 0.0];
+    let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    baked(&[[a, b, c], [a, c, d]])
+}
+
+/// What is small meets a large plate as exactly as its own size asks for, not as the plate's does.
+#[test]
+fn the_default_tolerance_is_that_of_the_smaller_shape() {
+    let (floor, block, point) = (floor(), baked(&cube()), baked(&[[[0.0; 3]; 3]]));
+    let ball = point.all().rounded(0.5).unwrap();
+    let falls = Motion::between(&at(1.0, 2.0, 10.0), &at(1.0, 2.0, -10.0)).unwrap();
+    let options = MotionOptions::new();
+    for querier in &mut queriers() {
+        for (falling, height, size) in [(block.all(), 1.0, 12f64.sqrt()), (ball, 0.5, 1.0)] {
+            for (a, b, path) in [(floor.all(), falling, true), (falling, floor.all(), false)] {
+                assert_eq!(options.tolerance_between(a, b), 1e-6 * size);
+                // Seen from what falls, the plate rises.
+                let rises = Motion::between(&at(-1.0, -2.0, -10.0), &at(-1.0, -2.0, 10.0)).unwrap();
+                let answer = querier.motion(a, b, if path { &falls } else { &rises }, &options).unwrap();
+                let MotionAnswer::Hit { free_until, touching_at, .. } = answer else { panic!("{answer:?}") };
+                let met = (10.0 - height) / 20.0;
+                assert!(free_until <= met + 1e-15 && touching_at >= met - 1e-15, "{answer:?}");
+                assert!(20.0 * (touching_at - free_until) <= 1e-6 * size, "{answer:?}");
+            }
+        }
+    }
+    // A point has no size of its own, and two have none at all.
+    assert_eq!(options.tolerance_between(&point, &floor), 1e-6 * 2e6f64.sqrt());
+    assert_eq!(options.tolerance_between(&point, &point), 1e-6);
+    assert_eq!(options.tolerance(0.25).tolerance_between(&point, &floor), 0.25);
+}
+
+/// However small a shape is, and however far from its frame's origin, the default tolerance is one that poses resolve.
+#[test]
+fn rounded_poses_resolve_the_default_tolerance() {
+    let grain = |size: f64, far: f64| -> Bvh {
+        baked(&cube().into_iter().map(|t| t.map(|p| p.map(|v| size * v + far))).collect::<Vec<_>>())
+    };
+    let mut querier = Querier::new().unwrap();
+    for (size, far) in [(1e-9, 0.0), (2f64.powi(-20), 0.0), (2f64.powi(-10), 1e7)] {
+        let (floor, grain) = (floor(), grain(size, far));
+        let height = |z: f64| at(-far, -far, z - far);
+        let falls = Motion::between(&height(10.0), &height(-10.0)).unwrap();
+        let answer = querier.motion(&floor, &grain, &falls, &MotionOptions::new()).unwrap();
+        let MotionAnswer::Hit { free_until, touching_at, .. } = answer else { panic!("{answer:?}") };
+        let most = MotionOptions::new().tolerance_between(&floor, &grain) + 1e-9 * (1.0 + far);
+        assert!(free_until <= 0.5 && 20.0 * (touching_at - free_until) <= most, "{answer:?}");
+        assert!(20.0 * (0.5 - touching_at).abs() <= size + most, "{answer:?}");
+    }
+}
+
 /// On any number of threads, a batch has the answers of the querier.
 #[test]
 #[cfg(feature = "parallel")]
@@ -442,6 +495,40 @@ fn numbers_that_mean_nothing_are_refused() {
     assert_eq!(answer, Err(QueryError::Budget { visits: 10 }));
     let half = Pose::from_quaternion([0.0, 0.0, 1.0, 0.0], [0.0; 3]).unwrap();
     assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(PathError::HalfTurn(_))));
+}
+
+/// At a time without a relative pose, neither a hit nor a free path is certain.
+#[test]
+fn poses_too_far_apart_for_a_relative_one_are_no_contact() {
+    /// A body in its place, but for a part of the time.
+    struct Lost {
+        home: f64,
+        far: f64,
+        times: [f64; 2],
+    }
+    impl RigidPath for Lost {
+        fn pose(&self, t: f64) -> Pose {
+            let [from, to] = self.times;
+            at(if (from..to).contains(&t) { self.far } else { self.home }, 0.0, 0.0)
+        }
+        fn sagitta(&self, _radius: f64, _t0: f64, _t1: f64) -> f64 {
+            1e-9
+        }
+    }
+    let block = baked(&cube());
+    for times in [[0.0, 0.25], [0.4, 0.6], [0.9, 2.0]] {
+        let a = Lost { home: 0.0, far: -2f64.powi(120), times };
+        let b = Lost { home: 9.0, far: 2f64.powi(120), times };
+        let path = RelativePath::new(&a, &b);
+        for querier in &mut queriers() {
+            let answer = querier.motion(&block, &block, &path, &MotionOptions::new());
+            let is_refused = matches!(answer, Err(QueryError::Number(NumberError::Unresolved(_))));
+            assert!(is_refused, "{times:?}: {answer:?}");
+            let is_free = querier.is_free(&block, &block, &path, &MotionOptions::new());
+            let is_refused = matches!(is_free, Err(QueryError::Number(NumberError::Unresolved(_))));
+            assert!(is_refused, "{times:?}: {is_free:?}");
+        }
+    }
 }
 
 /// Paths that break their promise: answers about them are as wrong as they are, but they end.

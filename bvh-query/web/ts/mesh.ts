@@ -102,7 +102,7 @@ export interface MotionOptions {
     /** Meshes that are at most this far apart, in mesh units, count as a hit. 0, contact, by default. */
     clearance?: number;
     /** The width of the undecided range beyond the clearance, in mesh units; by default a millionth of the diagonal of the
-     * larger object's box. */
+     * smaller object's box, radius included. Between a point and a mesh, it is a millionth of the mesh's. */
     tolerance?: number;
 }
 

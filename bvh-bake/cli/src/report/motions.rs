@@ -41,7 +41,7 @@ const METHODS: &str = "\
 <li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches.</li>
 <li>Certified answers are those of <code>Querier::motion</code>, which finds the first contact, and of \
 <code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided if the meshes come nearer than a \
-millionth of the larger mesh's diagonal without touching.</li>
+millionth of the smaller mesh's diagonal without touching.</li>
 <li>A certified contact is missed if all samples are free. A contact is late by the time between the end of the part that is \
 certified free and the contact found, as a fraction of the motion; only contacts that are not missed count.</li>
 <li>Times are those of single motions on one thread, with the poses of samples made as they are needed. All ways to ask take turns \

@@ -61,7 +61,7 @@ pub(crate) struct ViewArguments {
     /// With --motion: meshes that are at most this far apart count as a hit, in mesh units [default: 0]
     #[arg(long, value_name = "C", value_parser = not_negative, allow_negative_numbers = true, requires = "motion")]
     clearance: Option<f64>,
-    /// With --motion: how far beyond the clearance the answer may be near [default: 1e-6 of the larger diagonal]
+    /// With --motion: how far beyond the clearance the answer may be near [default: 1e-6 of the smaller diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true, requires = "motion")]
     tolerance: Option<f64>,
     /// Show a scene file, or a .cbvh file made by cbvh bake --scene, and the frames of a file

@@ -399,8 +399,8 @@ class Mesh:
         list or another iterable, the answer has arrays of N elements. The answer is certain at every moment, not only
         at samples. ``clearance``: meshes that are at most this far apart, in mesh units, count as a hit. ``tolerance``:
         the width of the undecided range beyond the clearance, in mesh units; if the meshes come that near and do not
-        hit, the answer may be NEAR. None: a millionth of the diagonal of the larger object's box. ``parallel`` has no
-        effect if a path is your own.
+        hit, the answer may be NEAR. None: a millionth of the diagonal of the smaller object's box, radius included;
+        between a point and a mesh, of the mesh's. ``parallel`` has no effect if a path is your own.
         """
         paths = read_paths(motion)
         found = _cbvh.motion(self._mesh, _other(other), paths, clearance, tolerance, parallel)

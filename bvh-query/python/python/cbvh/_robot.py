@@ -389,7 +389,7 @@ class Robot:
         """Whether the straight motion from q0 to q1 in joint space is certainly free, at every moment.
 
         False means that at some moment two bodies are within the clearance, or that their gap beyond it falls below the
-        tolerance: a millionth of the size of the larger one, unless another one is given. A floating joint turns about one
+        tolerance: a millionth of the size of the smaller one, unless another one is given. A floating joint turns about one
         axis, the shorter way. Other joints turn by the difference of their values, however long that way is: a continuous joint
         from 3.0 to -3.0 goes the long way round, unless q1 is what `nearest_turns` returns. A body that is inside a surface all the
         way without touching it is free: see `pairs_inside`. One row serves all rows of the other argument. A joint that turns by more

@@ -25,7 +25,7 @@ mod question;
 mod search;
 mod sweep;
 
-pub(crate) use question::{radius, size_of, tolerance};
+pub(crate) use question::{Measures, default_tolerance, radius, size_of};
 pub(crate) use search::Earliest;
 
 use crate::error::{NumberError, QueryError};
@@ -46,8 +46,9 @@ pub struct MotionOptions {
     /// Meshes that are at most this far apart count as a hit, in mesh units; 0 for contact.
     pub clearance: f64,
     /// The width of the undecided range beyond the clearance, in mesh units. If B comes that near and is no hit, the
-    /// answer may be [`MotionAnswer::Near`]. `None` stands for a millionth of the diagonal of the larger object's box.
-    /// A smaller tolerance costs more.
+    /// answer may be [`MotionAnswer::Near`]. `None` stands for the default, which
+    /// [`MotionOptions::tolerance_between`] gives: a millionth of the diagonal of the smaller object's box. A smaller
+    /// tolerance costs more.
     pub tolerance: Option<f64>,
 }
 
@@ -67,6 +68,18 @@ impl MotionOptions {
     #[must_use]
     pub fn tolerance(self, tolerance: impl Into<Option<f64>>) -> Self {
         Self { tolerance: tolerance.into(), ..self }
+    }
+
+    /// Returns the tolerance of a question about two shapes, in mesh units: the one that is set, or else the default. That
+    /// is a millionth of the smaller of both sizes, where the size of a shape is the largest diagonal of the boxes of its
+    /// objects and twice its radius. If one of them is a point without a radius, the other's size counts; for two such
+    /// points, the default is 1e-6.
+    ///
+    /// Poses are rounded. The default is therefore never below 2^-38 of how far the vertices of both are from the origins
+    /// of their frames. That counts where one size is less than a few millionths of the other, or of such a distance.
+    pub fn tolerance_between<'a>(&self, a: impl Into<Shape<'a>>, b: impl Into<Shape<'a>>) -> f64 {
+        let default = || default_tolerance(Measures::of(a.into()), Measures::of(b.into()));
+        self.tolerance.unwrap_or_else(default)
     }
 
     /// Returns an error for the numbers that every query refuses.

@@ -10,8 +10,12 @@ use crate::query::motion::MotionOptions;
 use crate::query::rounded::limit_of_cores;
 use bvh_format::object::Object;
 
-/// The default tolerance, as a fraction of the diagonal of the larger object's box.
+/// The default tolerance, as a fraction of the diagonal of the smaller object's box.
 const DEFAULT_TOLERANCE: f64 = 1e-6;
+/// The least default tolerance, as a fraction of how far vertices are from the origins of both frames: 2^-38. A cell has to
+/// be reached before B moves by less than the rounding of its poses, which is below 2^-42 of these distances where the meshes
+/// are near each other. A cell may reach an eighth of the tolerance.
+const LEAST_TOLERANCE: f64 = 1.0 / (1u64 << 38) as f64;
 /// More than the relative error of all `f64` arithmetic on coordinates here.
 const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
 
@@ -58,7 +62,7 @@ impl<'a> Question<'a> {
     ) -> Result<Self, QueryError> {
         options.check()?;
         let question = Self::unchecked(a, b, path);
-        let tolerance = tolerance(question.size, options);
+        let tolerance = options.tolerance_between(a, b);
         Ok(Self { clearance: limit_of_cores(a, b, options.clearance), tolerance, ..question })
     }
 
@@ -110,11 +114,27 @@ impl<'a> Question<'a> {
     }
 }
 
-/// Returns the tolerance of a question about two shapes, given the larger of their sizes.
-pub(crate) fn tolerance(size: f64, options: &MotionOptions) -> f64 {
-    // Two points have no diagonal.
-    let default = if size > 0.0 { DEFAULT_TOLERANCE * size } else { DEFAULT_TOLERANCE };
-    options.tolerance.unwrap_or(default)
+/// What the default tolerance of a question depends on, of one shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Measures {
+    /// The largest diagonal of the boxes of its objects, and two radii, in mesh units.
+    pub(crate) size: f64,
+    /// How far vertices are at most from the origin of their frame, in mesh units.
+    pub(crate) radius: f64,
+}
+
+impl Measures {
+    pub(crate) fn of(shape: Shape<'_>) -> Self {
+        Self { size: size_of(shape.objects(), shape.radius()), radius: radius(shape.objects()) }
+    }
+}
+
+/// Returns the default tolerance of a question about two shapes.
+pub(crate) fn default_tolerance(a: Measures, b: Measures) -> f64 {
+    let (smaller, larger) = (a.size.min(b.size), a.size.max(b.size));
+    // A point has no size of its own, and two points have none at all.
+    let size = [smaller, larger].into_iter().find(|&size| size > 0.0).unwrap_or(1.0);
+    (DEFAULT_TOLERANCE * size).max(LEAST_TOLERANCE * (a.radius + b.radius))
 }
 
 /// Returns how far vertices of objects are at most from the origin of their frame, rounded up, in mesh units.

@@ -144,6 +144,22 @@ fn check_by_samples(scene: &mut Scene, placed: &[Placed], options: &MotionOption
     }
 }
 
+/// A small block meets a large plate as exactly as its own size asks for, whichever of both moves.
+#[test]
+fn the_default_tolerance_of_a_pair_is_that_of_the_smaller_shape() {
+    let plate = shape(&[[[-500.0, -500.0, 0.0], [500.0, -500.0, 0.0], [0.0, 900.0, 0.0]]]);
+    let mut scene = Scene::new().unwrap();
+    let floor = scene.add(plate, Pose::IDENTITY).unwrap();
+    let block = scene.add(shape(&cube()), at(0.0, 0.0, 10.0)).unwrap();
+    for (id, from, to) in [(block, 10.0, -10.0), (floor, 0.0, 20.0)] {
+        let way = Motion::between(&at(0.0, 0.0, from), &at(0.0, 0.0, to)).unwrap();
+        let answer = scene.motion(&[(id, &way)], &MotionOptions::new()).unwrap();
+        let Some((true, free_until, touching_at, ..)) = told(answer) else { panic!("{answer:?}") };
+        assert!(free_until <= 0.45 + 1e-15 && touching_at >= 0.45 - 1e-15, "{answer:?}");
+        assert!(20.0 * (touching_at - free_until) <= 4e-6, "{answer:?}");
+    }
+}
+
 #[test]
 fn two_that_change_places_meet_and_two_side_by_side_do_not() {
     let block = shape(&cube());
