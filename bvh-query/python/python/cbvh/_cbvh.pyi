@@ -159,7 +159,7 @@ class Robot:
     def of_parts(
         texts: tuple[_Text, _Text | None, bool, str],
         links: list[tuple[Mesh, float, bool]],
-        others: list[tuple[str, Mesh, Any, str | None, ArrayLike]],
+        others: Sequence[tuple[str, Mesh, Any, str | None, ArrayLike]],
         margins: list[tuple[str, float]],
         allowed: list[list[str]],
     ) -> Robot: ...

@@ -235,11 +235,11 @@ class Robot:
             self._unseen |= {name}
         return name
 
-    def _look_inside(self, rows: NDArray[np.float64]) -> None:
-        """Warns of what is inside obstacles that were added since the last call, in the first configuration."""
+    def _look_inside(self, q: NDArray[np.float64]) -> None:
+        """Warns of what is inside obstacles that were added since the last call, in one configuration."""
         unseen, self._unseen = self._unseen, frozenset()
         try:
-            found = self._robot.pairs_inside(rows[:1], False)[0]
+            found = self._robot.pairs_inside(np.ascontiguousarray(q[None]), False)[0]
         except (ValueError, KeyError):
             return  # Without an answer, there is nothing to warn of; `pairs_inside` says why.
         for inner, outer in found:
@@ -318,7 +318,7 @@ class Robot:
         rows, one = self._rows(q)
         found = self._robot.collide(rows, parallel)
         if self._unseen and len(rows):
-            self._look_inside(rows)
+            self._look_inside(rows[0])
         return bool(found[0]) if one else found
 
     def pairs_in_contact(self, q: ArrayLike, *, parallel: bool = False) -> Any:
@@ -398,7 +398,7 @@ class Robot:
         from_, to, one = self._ends(q0, q1)
         free = self._robot.is_free(from_, to, float(clearance), tolerance, parallel)
         if self._unseen and len(from_):
-            self._look_inside(from_)
+            self._look_inside(from_[0])
         return bool(free[0]) if one else free
 
     def motion(
@@ -437,7 +437,7 @@ class Robot:
             raise ValueError(f"coefficients: expected shape ({count}, degree + 1), found {of.shape}")
         kind, free_until, at, joints, bodies, distance = self._robot.motion(of, float(clearance), tolerance)
         if self._unseen:
-            self._look_inside(of[None, :, 0])
+            self._look_inside(of[:, 0])
         is_free = kind == 0
         return RobotMotion(
             MotionKind(kind),
