@@ -1614,7 +1614,9 @@ public:
     }
 
     /// The end to which joints that turn without limits go the short way: see cbvh_robot_nearest_turns.
-    Joints nearest_turns(const Joints &start, const Joints &end) const { return nearest_turns({start}, {end})[0]; }
+    Joints nearest_turns(const Joints &start, const Joints &end) const {
+        return nearest_turns(std::vector<Joints>{start}, std::vector<Joints>{end})[0];
+    }
     std::vector<Joints> nearest_turns(const std::vector<Joints> &starts, const std::vector<Joints> &ends) const {
         const Rows from("starts", starts), to("ends", ends, starts);
         std::vector<double> nearest(to.numbers.size());

@@ -23,8 +23,7 @@ impl Robot {
     /// most half a turn away stays as it is, to the bit.
     ///
     /// ```
-    /// # use cbvh_robot::{Robot, RobotOptions};
-    /// # fn way(robot: &mut Robot, start: &[f64], goal: &[f64]) -> Result<bool, cbvh_robot::RobotError> {
+    /// # fn way(robot: &mut cbvh_robot::Robot, start: &[f64], goal: &[f64]) -> Result<bool, cbvh_robot::RobotError> {
     /// let goal = robot.nearest_turns(start, goal)?;
     /// robot.is_free(start, &goal)
     /// # }
