@@ -26,7 +26,7 @@ fn turn([x, y, z]: [f64; 3], angle: f64) -> Matrix {
 }
 
 fn read(text: &str, base: Base) -> Robot {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
     Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
@@ -103,7 +103,7 @@ fn each_kind_of_joint_moves_its_child() {
 
 #[test]
 fn the_semantics_name_groups_states_and_pairs_to_pass_over() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let srdf = folder.path().join("arm.srdf");
     let text = r#"<robot name="small_arm">
       <group name="arm"><chain base_link="base" tip_link="forearm"/></group>

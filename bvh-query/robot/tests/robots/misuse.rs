@@ -4,7 +4,7 @@ use bvh_query::{MotionOptions, Pose};
 use cbvh_robot::{Base, Edge, Robot, RobotError, RobotOptions};
 
 fn read(text: &str) -> Result<Robot, RobotError> {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
     Robot::from_urdf(path, &RobotOptions::default())
@@ -158,7 +158,7 @@ fn robot_shape() -> bvh_query::OwnedShape {
 
 #[test]
 fn a_quaternion_without_length_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, with(JOINT, BALL)).unwrap();
     let mut robot =
