@@ -41,7 +41,7 @@ fn described(folder: &Path) -> Robot {
 
 /// The arm after all kinds of changes.
 fn changed() -> Robot {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let mut robot = described(folder.path());
     robot.add_obstacle("gone", block([1.0; 3]), &Pose::IDENTITY).unwrap();
     robot.add_obstacle("pillar", block([0.1, 0.1, 1.5]), &at([0.45, 0.0, 0.75])).unwrap();

@@ -27,7 +27,7 @@ const TURNING: &str = r#"<robot name="turning">
 </robot>"#;
 
 fn turning() -> Robot {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, TURNING).unwrap();
     Robot::from_urdf(path, &RobotOptions::default()).unwrap()
