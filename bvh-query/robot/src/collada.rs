@@ -321,9 +321,13 @@ mod tests {
             format!("<node id=\"n{number}\">{next}{next}</node>")
         };
         let again: String = (0..40).map(twice).collect::<String>() + "<node id=\"n40\"/>";
-        let far = "<polygons><input semantic=\"VERTEX\" source=\"#v\" offset=\"18446744073709551615\"/><p>0</p></polygons>";
+        let far = format!(
+            "<polygons><input semantic=\"VERTEX\" source=\"#v\" offset=\"{}\"/><p>0</p></polygons>",
+            usize::MAX
+        );
+        let at_offset = format!("an input at offset {}", usize::MAX);
         for (primitive, nodes, expected) in [
-            (far.to_owned(), HERE, "an input at offset 18446744073709551615"),
+            (far, HERE, &*at_offset),
             (polygon("0 0 0 1 0 4"), HERE, "vertex 4 of 4"),
             (polygon("0 0 0 x 0 1"), HERE, "'x' in place of a whole number"),
             (

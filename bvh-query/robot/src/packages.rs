@@ -20,10 +20,12 @@ pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<PathBu
         Some(rest) => {
             let rest = rest.trim_start_matches('/');
             let (name, in_package) = rest.split_once('/').unwrap_or((rest, ""));
-            let from_environment = std::env::var_os("ROS_PACKAGE_PATH").unwrap_or_default();
+            // WebAssembly has no lists of paths, and there the standard library panics when it splits one.
+            let is_list = !cfg!(target_family = "wasm");
+            let listed = std::env::var_os("ROS_PACKAGE_PATH").filter(|_| is_list);
             let whole = std::path::absolute(urdf).unwrap_or_else(|_| urdf.to_owned());
             let folders = folders.iter().cloned();
-            let folders = folders.chain(std::env::split_paths(&from_environment));
+            let folders = folders.chain(listed.iter().flat_map(|paths| std::env::split_paths(paths)));
             let folders = folders.chain(whole.ancestors().skip(1).map(Path::to_owned));
             folders.into_iter().find_map(|folder| {
                 let itself = (folder.file_name() == Some(name.as_ref())).then(|| folder.join(in_package));
