@@ -511,8 +511,9 @@ fn poses_too_far_apart_for_a_relative_one_are_no_contact() {
             let [from, to] = self.times;
             at(if (from..to).contains(&t) { self.far } else { self.home }, 0.0, 0.0)
         }
-        fn sagitta(&self, _radius: f64, _t0: f64, _t1: f64) -> f64 {
-            1e-9
+        fn sagitta(&self, _radius: f64, t0: f64, t1: f64) -> f64 {
+            let [from, to] = self.times;
+            if t1 < from || t0 >= to { 1e-9 } else { f64::INFINITY }
         }
     }
     let block = baked(&cube());

@@ -140,8 +140,8 @@ impl Querier {
     /// Cost: about one contact query for each interval that must be tested. There are few intervals if B keeps a
     /// distance that is larger than the bend of its path, and some thirty for a hit, or for a gap below the tolerance. There may
     /// be one query for each eighth of the tolerance that B moves by while the gap is no more than rounding, or while B turns
-    /// at a gap far below the tolerance, because a hit may still follow. A budget limits that, and [`Querier::is_free`]
-    /// avoids it, because it can say no at once.
+    /// at a gap far below the tolerance, because a hit may still follow: seconds where a part slides over the floor it rests
+    /// on. A larger tolerance or a budget limits that, and [`Querier::is_free`] avoids it, because it can say no at once.
     ///
     /// # Errors
     /// [`QueryError::Number`] if the clearance or the tolerance is not a valid number, or if the tolerance is too small
