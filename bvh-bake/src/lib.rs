@@ -66,6 +66,7 @@ mod tree;
 mod triangles;
 
 pub use bake::files::{FileBake, Outcome, least_memory};
+pub use bake::provenance::generator;
 pub use bake::report::{BakeReport, FileSummary};
 pub use bake::{to_bytes, to_bytes_with};
 pub use bvh_format::leaf::TriangleEncoding;

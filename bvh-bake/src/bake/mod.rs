@@ -1,7 +1,7 @@
 //! Bakes a mesh into the bytes of a file, stage by stage.
 
 pub(crate) mod files;
-mod provenance;
+pub(crate) mod provenance;
 pub(crate) mod report;
 
 use crate::check::prove::prove;

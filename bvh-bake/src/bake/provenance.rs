@@ -17,6 +17,12 @@ use std::path::{Path, PathBuf};
 /// that files of an earlier revision do not count as up to date.
 const REVISION: u32 = 8;
 
+/// Returns the name of this baker, its version and its revision, as files state them. Bakes of equal meshes with equal options
+/// ([`Options::stamp`]) by bakers of the same name have the same bytes, so that all three make the key of a cache.
+pub fn generator() -> String {
+    format!("cbvh {}, revision {REVISION}", env!("CARGO_PKG_VERSION"))
+}
+
 /// The lines `key=value` of the provenance section.
 pub(super) struct Provenance {
     /// The names of the input files, for people.
@@ -30,10 +36,9 @@ impl Provenance {
         // Directories describe the machine rather than the mesh.
         let name = |path: &PathBuf| path.file_name().map(|name| plain(&name.to_string_lossy()));
         let names: Vec<String> = inputs.iter().filter_map(name).collect();
-        let generator = format!("cbvh {}, revision {REVISION}", env!("CARGO_PKG_VERSION"));
         let files: Vec<u64> = checksums.iter().map(|checksums| checksums.file).collect();
         let input = format!("{:016x}", joined(&files));
-        let mut stamp = vec![("generator", generator), ("options", options.stamp()), ("input_xxh3", input)];
+        let mut stamp = vec![("generator", generator()), ("options", options.stamp()), ("input_xxh3", input)];
         let meshes: Vec<u64> = checksums.iter().filter_map(|checksums| checksums.mesh).collect();
         if !meshes.is_empty() {
             stamp.push(("mesh_xxh3", format!("{:016x}", joined(&meshes))));

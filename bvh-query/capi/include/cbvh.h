@@ -1105,6 +1105,11 @@ typedef struct cbvh_robot_options {
     /* Asks about the visual shapes of links (1) or their collision shapes (0). */
     int32_t visual;
     cbvh_robot_base base;
+    /* Lets the URDF name meshes anywhere (1), or only in the folder above its own and below, in its package, in packages
+     * that it names, and in the folders of packages (0). */
+    int32_t allow_outside;
+    /* 0. */
+    int32_t reserved;
 } cbvh_robot_options;
 
 /* A body of a robot. 0 is none. A robot and its clones never give the number of a removed body again. */
@@ -1118,7 +1123,7 @@ typedef struct cbvh_body_pair {
 
 /* Reads a URDF file, and bakes the shapes of its links: meshes (OBJ, STL, PLY, glTF, COLLADA), boxes, spheres, cylinders
  * and capsules. CBVH_SYSTEM if a file is not there or may not be read, CBVH_INVALID_ARGUMENT if a description is not
- * valid, CBVH_BAKE_FAILED if a mesh cannot be baked, CBVH_DAMAGED if a file in the cache is. The message names the file
+ * valid or names a mesh where it may not, CBVH_LIMIT if it is too long, CBVH_BAKE_FAILED if a mesh cannot be baked, CBVH_DAMAGED if a file in the cache is. The message names the file
  * and the element. */
 cbvh_status cbvh_robot_from_urdf(const char *path, const cbvh_robot_options *options, cbvh_robot *robot);
 /* Makes a copy of a robot with the same bodies, which shares their meshes. It takes about a microsecond. */
@@ -1145,6 +1150,9 @@ cbvh_status cbvh_robot_name(cbvh_robot robot, char *buffer, size_t capacity, siz
 /* Of a joint value: the name of a joint that turns or slides, NAME/x, NAME/y and NAME/theta of a planar joint, and NAME/x
  * to NAME/z and NAME/qx to NAME/qw of a floating one. Fixed joints and those that mimic others have no values. */
 cbvh_status cbvh_robot_joint_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
+/* Of what was passed over when the robot was read and may not be meant so: a sentence that begins with the file and the
+ * line, for a name in the SRDF file that the robot does not have, for example. CBVH_NOT_FOUND after the last one. */
+cbvh_status cbvh_robot_warning(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 cbvh_status cbvh_robot_group_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 cbvh_status cbvh_robot_state_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 /* Of the group that a state is of. */

@@ -1357,6 +1357,7 @@ struct RobotOptions {
     double cylinder_error = 0;
     bool visual = false;
     cbvh_robot_base base = CBVH_BASE_FIXED;
+    bool allow_outside = false;
 };
 
 /// A robot among obstacles, asked about with the values of its joints, which are in the order of joints(). Threads may ask
@@ -1394,6 +1395,7 @@ public:
         raw_options.cylinder_error = options.cylinder_error;
         raw_options.visual = options.visual;
         raw_options.base = options.base;
+        raw_options.allow_outside = options.allow_outside;
         return made([&](cbvh_robot *robot) {
             return cbvh_robot_from_urdf(detail::c_text("path", path), &raw_options, robot);
         });
@@ -1437,6 +1439,20 @@ public:
             names.push_back(name(link));
         }
         return names;
+    }
+    /// What was passed over when the robot was read: see cbvh_robot_warning.
+    std::vector<std::string> warnings() const {
+        std::vector<std::string> warnings;
+        for (;;) {
+            try {
+                warnings.push_back(text(cbvh_robot_warning, warnings.size()));
+            } catch (const Error &error) {
+                if (error.status() == CBVH_NOT_FOUND) {
+                    return warnings;
+                }
+                throw;
+            }
+        }
     }
     std::vector<Group> groups() const {
         std::vector<Group> groups;

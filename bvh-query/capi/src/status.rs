@@ -94,6 +94,7 @@ fn of_robot(error: &RobotError) -> Status {
     match error {
         RobotError::Io { .. } | RobotError::NoMesh { .. } => Status::System,
         RobotError::Mesh { source, .. } => of_bake(source),
+        RobotError::TooLong { .. } => Status::Limit,
         RobotError::Cache { source } => of_open(source),
         RobotError::Unknown { .. } => Status::NotFound,
         RobotError::Query(source) | RobotError::Pair { source, .. } | RobotError::NotSolid { source, .. } => {

@@ -32,6 +32,7 @@ static const char *SRDF = "<robot name=\"small_arm\">\n"
                           "<disable_collisions link1=\"turret\" link2=\"upper_arm\" reason=\"Adjacent\"/>\n"
                           "<disable_collisions link1=\"upper_arm\" link2=\"forearm\" reason=\"Adjacent\"/>\n"
                           "<disable_collisions link1=\"forearm\" link2=\"hand\" reason=\"Adjacent\"/>\n"
+                          "<disable_collisions link1=\"forearm\" link2=\"gripper\" reason=\"Never\"/>\n"
                           "</robot>\n";
 
 static void write_file(const char *path, const char *text) {
@@ -116,6 +117,10 @@ static void description(void) {
         OK(cbvh_robot_find(robot, text, &found));
         CHECK(found.id == bodies[k].id);
     }
+    char warning[2000];
+    OK(cbvh_robot_warning(robot, 0, warning, sizeof warning, &length));
+    CHECK(strstr(warning, "robot.srdf: line 9, <disable_collisions>: the robot has no link 'gripper'") != NULL);
+    FAILS(cbvh_robot_warning(robot, 1, warning, sizeof warning, &length), CBVH_NOT_FOUND, "expected a warning");
     OK(cbvh_robot_group_name(robot, 0, text, sizeof text, &length));
     OK(cbvh_robot_group_joints(robot, 0, places, 2, &count));
     CHECK(strcmp(text, "upper") == 0 && count == 2 && places[0] == 0 && places[1] == 2);
@@ -592,19 +597,31 @@ static void misuse(void) {
         "<mesh filename=\"package://p/x.stl\"/></geometry></collision></link></robot>");
     FAILS(cbvh_robot_from_urdf(in(scratch, "away.urdf"), NULL, &made), CBVH_SYSTEM,
           "link a: expected the mesh package://p/x.stl, found none at");
+    /* A mesh of another folder. */
+    char outside[2200];
+    snprintf(outside, sizeof outside, "<robot name=\"r\"><link name=\"a\"><collision><geometry><mesh filename=\"%s\"/>"
+        "</geometry></collision></link></robot>", in(testdata, "robot/base.obj"));
+    write_file(in(scratch, "outside.urdf"), outside);
+    FAILS(cbvh_robot_from_urdf(in(scratch, "outside.urdf"), NULL, &made), CBVH_INVALID_ARGUMENT, "or allow meshes outside");
+    const cbvh_robot_options anywhere = {.size = sizeof anywhere, .allow_outside = 1};
+    OK(cbvh_robot_from_urdf(in(scratch, "outside.urdf"), &anywhere, &made));
+    OK(cbvh_robot_free(made));
     const char *const folders[2] = {testdata, NULL};
     const cbvh_robot_options options[] = {
         {.size = 8},
         {.size = sizeof made, .base = 1},
         {.size = sizeof *options, .base = 3},
         {.size = sizeof *options, .visual = 2},
+        {.size = sizeof *options, .allow_outside = 2},
+        {.size = sizeof *options, .reserved = 1},
         {.size = sizeof *options, .cylinder_error = -1},
         {.size = sizeof *options, .cylinder_error = NAN},
         {.size = sizeof *options, .package_count = 1},
         {.size = sizeof *options, .packages = folders, .package_count = 2},
     };
-    const char *const messages[] = {"options.size: expected 56", "options.size", "options.base: expected a number of",
-        "options.visual: expected 0 or 1", "options.cylinder_error: expected 0 or", "options.cylinder_error",
+    const char *const messages[] = {"options.size: expected 64", "options.size", "options.base: expected a number of",
+        "options.visual: expected 0 or 1", "options.allow_outside: expected 0 or 1", "options.reserved: expected 0",
+        "options.cylinder_error: expected 0 or", "options.cylinder_error",
         "options.packages: expected a pointer, found NULL", "options.packages[1]: expected a pointer, found NULL"};
     for (size_t k = 0; k < sizeof options / sizeof *options; k++) {
         FAILS(cbvh_robot_from_urdf(urdf(), &options[k], &made), CBVH_INVALID_ARGUMENT, messages[k]);

@@ -179,12 +179,14 @@ impl Robot {
         base: &str,
         cylinder_error: f64,
         cache: Option<PathBuf>,
+        allow_outside: bool,
     ) -> PyResult<Self> {
         let mut options = RobotOptions::default();
         (options.packages, options.srdf, options.cache) = (packages, srdf, cache);
         options.geometry = if visual { Geometry::Visual } else { Geometry::Collision };
         options.base = base_of(base);
         options.cylinder_error = cylinder_error;
+        options.allow_outside = allow_outside;
         let robot = detached(py, || on_pool(|| cbvh_robot::Robot::from_urdf(path, &options)))?;
         Ok(Self::of(robot.map_err(robot_error)?, HashMap::new()))
     }
@@ -289,6 +291,10 @@ impl Robot {
 
     fn links(&self) -> Vec<String> {
         locked(&self.0).robot.links().map(str::to_owned).collect()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        locked(&self.0).robot.warnings().to_vec()
     }
 
     /// The names and the joints' places of groups.

@@ -242,6 +242,9 @@ class Describing(unittest.TestCase):
         q = robot.q(robot.states["arm"]["up"], **robot.states["wrist"]["rest"])
         self.assertEqual(q.tolist(), [0, -0.5, 0.25, 1])
         self.assertEqual((bare.groups, bare.states), ({}, {}))
+        (warning,) = robot.warnings
+        self.assertIn("arm.srdf: line 9, <disable_collisions>: the robot has no link 'of another robot'", warning)
+        self.assertEqual((bare.warnings, copy.copy(robot).warnings), ([], [warning]))
 
     def test_packages_and_a_cache(self):
         package = self.folder / "ros" / "my_arm"
@@ -260,6 +263,15 @@ class Describing(unittest.TestCase):
                 found = robot.distance([0.1, 0.2, 0.3, 0.4])
                 self.assertEqual((found.distance, found.bodies), (expected.distance, expected.bodies))
         self.assertTrue(any((self.folder / "cache").iterdir()))
+
+    def test_meshes_elsewhere_are_read_if_that_is_allowed(self):
+        text = URDF.read_text().replace('filename="', f'filename="{URDF.parent}/')
+        path = self.write("arm.urdf", text)
+        with self.assertRaises(ValueError) as caught:
+            cbvh.Robot.from_urdf(path)
+        self.assertIn("or allow meshes outside", str(caught.exception))
+        for options in ({"allow_outside": True}, {"package_dirs": [URDF.parent]}):
+            self.assertEqual(len(cbvh.Robot.from_urdf(path, **options).links), 5)
 
     def test_robots_without_joints(self):
         path = self.write(

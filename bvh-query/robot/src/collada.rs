@@ -101,6 +101,7 @@ impl<'a, 'n> Reader<'a, 'n> {
 
     /// Reads the triangles of a geometry.
     fn geometry(&mut self, geometry: Node<'n, 'a>, place: &Affine) -> Result<(), String> {
+        self.count(STEPS_PER_NODE)?;
         let Some(mesh) = geometry.children().find(|node| node.has_tag_name("mesh")) else { return Ok(()) };
         let is_mirrored = determinant(place) < 0.0;
         // Primitives of a mesh mostly share their vertices.
@@ -154,6 +155,8 @@ impl<'a, 'n> Reader<'a, 'n> {
                     }
                     "polylist" => {
                         let counts = counts.and_then(|counts| counts.text()).unwrap_or_default();
+                        // Two bytes at least for each.
+                        self.count(counts.len() / 2)?;
                         let mut rest = corners.as_slice();
                         for count in counts.split_whitespace() {
                             let count = index(count)?;

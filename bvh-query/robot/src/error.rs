@@ -17,6 +17,14 @@ pub enum RobotError {
         /// The error of the system.
         source: io::Error,
     },
+    /// A description is too long.
+    #[error("{}: expected at most {most} bytes, found more", path.display())]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// The most bytes that it may have.
+        most: u64,
+    },
     /// A description is not what it should be.
     #[error("{}: {place}: expected {expected}, found {found}", path.display())]
     Description {
@@ -43,6 +51,24 @@ pub enum RobotError {
         uri: String,
         /// The places.
         tried: Vec<PathBuf>,
+    },
+    /// A mesh is in no folder in which the file may name meshes.
+    #[error(
+        "{}: link {link}: expected the mesh {uri} below {}, or in a package, found it at {}; give its folder as one of packages, \
+         or allow meshes outside",
+        path.display(), list(folders), found.display()
+    )]
+    Outside {
+        /// The URDF file.
+        path: PathBuf,
+        /// The link.
+        link: String,
+        /// The mesh, as the file names it.
+        uri: String,
+        /// The folders in which it may be.
+        folders: Vec<PathBuf>,
+        /// Where it is.
+        found: PathBuf,
     },
     /// A mesh cannot be baked.
     #[error("{}: link {link}: {source}", path.display())]

@@ -4,6 +4,7 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each, product};
+use std::collections::HashSet;
 
 /// The links and joints of a robot.
 #[derive(Debug)]
@@ -19,6 +20,8 @@ pub(crate) struct Model {
     pub(crate) numbers: Vec<String>,
     /// The lower and the upper limit of each number.
     pub(crate) limits: Vec<[f64; 2]>,
+    /// The names of joints that do not move, which are none of the joints above.
+    pub(crate) fixed: HashSet<String>,
 }
 
 #[derive(Debug)]

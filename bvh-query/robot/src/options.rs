@@ -37,8 +37,12 @@ pub struct RobotOptions {
     pub base: Base,
     /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000.
     pub cylinder_error: f64,
-    /// A folder for baked meshes, under names that follow from content, so that they are baked once.
+    /// A folder for baked meshes, under names that follow from what was read, so that they are baked once.
     pub cache: Option<PathBuf>,
+    /// Lets the URDF name meshes anywhere. By default they must be in the folder above that of the URDF or below it, in the
+    /// package of the URDF, in a package that a `package://` path names, or in `packages`, because the author of the file could
+    /// otherwise choose which files of this system are read.
+    pub allow_outside: bool,
 }
 
 impl Default for RobotOptions {
@@ -50,6 +54,7 @@ impl Default for RobotOptions {
             base: Base::Fixed,
             cylinder_error: 1e-3,
             cache: None,
+            allow_outside: false,
         }
     }
 }

@@ -1,13 +1,29 @@
-//! Finds the files that a URDF names: by relative paths, by `file://`, and by `package://` in ROS packages.
+//! Finds the files that a URDF names: by relative paths, by `file://`, and by `package://` in ROS packages. Tells which files it
+//! may name.
+//!
+//! The author of a URDF need not be its reader, so that it may not name any file of the system. Meshes are in the robot's package,
+//! beside the folder of the URDF, in another package, or in a folder that the reader named.
 
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
+use std::path::{Component, Path, PathBuf};
+
+/// The file in the folder of a ROS package that makes it one.
+const PACKAGE: &str = "package.xml";
+
+/// A file that a URDF names.
+#[derive(Debug)]
+pub(crate) struct Named {
+    pub(crate) path: PathBuf,
+    /// Whether it is in a folder in which a URDF may name files.
+    pub(crate) is_inside: bool,
+}
 
 /// Returns the file that a URDF means, or the places where it was looked for.
 ///
 /// `package://NAME/REST` is looked for in the given folders, in those of `ROS_PACKAGE_PATH`, and in the folders above the URDF
 /// file, first as `NAME/REST` and then, in a folder that is called NAME itself, as `REST`. Packages that are installed with a
 /// Python module, like those of example-robot-data, are above their URDF files. `model://` is the same.
-pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<PathBuf, Vec<PathBuf>> {
+pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<Named, Vec<PathBuf>> {
     let mut tried = Vec::new();
     let mut look = |path: PathBuf| {
         let found = path.is_file();
@@ -15,23 +31,91 @@ pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<PathBu
         found.then(|| tried[tried.len() - 1].clone())
     };
     let beside = urdf.parent().unwrap_or_else(|| Path::new(""));
+    // WebAssembly has no lists of paths, and there the standard library panics when it splits one.
+    let is_list = !cfg!(target_family = "wasm");
+    let listed = std::env::var_os("ROS_PACKAGE_PATH").filter(|_| is_list);
+    let listed = listed.iter().flat_map(|paths| std::env::split_paths(paths));
+    let folders = folders.iter().cloned().chain(listed).filter(|folder| !folder.as_os_str().is_empty());
+    let folders: Vec<PathBuf> = folders.collect();
+    let mut package = None;
     let found = match uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://")) {
         None => look(beside.join(uri.strip_prefix("file://").unwrap_or(uri))),
         Some(rest) => {
             let rest = rest.trim_start_matches('/');
             let (name, in_package) = rest.split_once('/').unwrap_or((rest, ""));
-            // WebAssembly has no lists of paths, and there the standard library panics when it splits one.
-            let is_list = !cfg!(target_family = "wasm");
-            let listed = std::env::var_os("ROS_PACKAGE_PATH").filter(|_| is_list);
-            let whole = std::path::absolute(urdf).unwrap_or_else(|_| urdf.to_owned());
-            let folders = folders.iter().cloned();
-            let folders = folders.chain(listed.iter().flat_map(|paths| std::env::split_paths(paths)));
-            let folders = folders.chain(whole.ancestors().skip(1).map(Path::to_owned));
-            folders.into_iter().find_map(|folder| {
-                let itself = (folder.file_name() == Some(name.as_ref())).then(|| folder.join(in_package));
-                look(folder.join(rest)).or_else(|| itself.and_then(&mut look))
+            let whole = absolute(urdf);
+            let above = whole.ancestors().skip(1).map(Path::to_owned);
+            folders.iter().cloned().chain(above).find_map(|folder| {
+                let is_itself = folder.file_name() == Some(OsStr::new(name));
+                let found = look(folder.join(rest)).map(|found| (folder.join(name), found));
+                let found = found.or_else(|| {
+                    let itself = is_itself.then(|| folder.join(in_package)).and_then(&mut look);
+                    itself.map(|found| (folder.clone(), found))
+                });
+                found.map(|(folder, found)| {
+                    package = Some(folder);
+                    found
+                })
             })
         }
     };
-    found.ok_or(tried)
+    let path = found.ok_or(tried)?;
+    let is_inside = is_inside(&path, urdf, &folders, package.as_deref());
+    Ok(Named { path, is_inside })
+}
+
+/// Returns whether a URDF may name a file: whether the file is in a folder that the reader named, links in it included; or, after
+/// links are followed, beside the URDF's folder or below, in the URDF's package, or in another package in which it was found.
+fn is_inside(file: &Path, urdf: &Path, named: &[PathBuf], package: Option<&Path>) -> bool {
+    let by_name = without_dots(&absolute(file));
+    if named.iter().any(|folder| by_name.starts_with(without_dots(&absolute(folder)))) {
+        return true;
+    }
+    let Ok(file) = file.canonicalize() else { return false };
+    // A workspace may hold links to the files of a package, one by one: the package is then where its links lead, too.
+    let mut folders: Vec<PathBuf> = [Some(absolute(urdf)), urdf.canonicalize().ok()]
+        .into_iter()
+        .flatten()
+        .flat_map(|urdf| own_folders(&urdf))
+        .collect();
+    if let Some(marker) = package.map(|package| package.join(PACKAGE)).filter(|marker| marker.is_file()) {
+        folders.extend(marker.canonicalize().ok().and_then(|marker| Some(marker.parent()?.to_owned())));
+        folders.extend(package.map(Path::to_owned));
+    }
+    folders.iter().filter_map(|folder| folder.canonicalize().ok()).any(|folder| file.starts_with(folder))
+}
+
+/// Returns the folder above that of a URDF, unless it is the root of a file system, and the package that holds the URDF.
+fn own_folders(urdf: &Path) -> Vec<PathBuf> {
+    let Some(beside) = urdf.parent() else { return Vec::new() };
+    let above = beside.parent().filter(|above| above.parent().is_some());
+    let package = beside.ancestors().find(|folder| folder.join(PACKAGE).is_file());
+    let package = package.filter(|package| package.parent().is_some());
+    [Some(beside), above, package].into_iter().flatten().map(Path::to_owned).collect()
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// Returns a path whose `..` are resolved by names alone.
+fn without_dots(path: &Path) -> PathBuf {
+    let mut whole = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => drop(whole.pop()),
+            part => whole.push(part),
+        }
+    }
+    whole
+}
+
+/// Returns the folders in which a URDF may name files, for people.
+pub(crate) fn folders_of(urdf: &Path, named: &[PathBuf]) -> Vec<PathBuf> {
+    let mut folders = own_folders(&absolute(urdf));
+    // The last ones hold the first one.
+    folders.reverse();
+    folders.truncate(1);
+    folders.extend(named.iter().cloned());
+    folders
 }

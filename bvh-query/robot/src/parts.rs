@@ -3,7 +3,7 @@
 use crate::error::RobotError;
 use crate::options::{Base, Geometry, RobotOptions};
 use crate::robot::Robot;
-use crate::xml::text_of;
+use crate::xml::{MAX_BYTES, text_of};
 use bvh_query::{OwnedShape, Pose};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,8 +20,9 @@ pub(crate) struct Source {
 
 impl Source {
     pub(crate) fn read(path: &Path, options: &RobotOptions) -> Result<Self, RobotError> {
-        let urdf = text_of(path)?;
-        let srdf = options.srdf.as_ref().map(|srdf| Ok::<_, RobotError>((srdf.clone(), text_of(srdf)?)));
+        let urdf = text_of(path, MAX_BYTES)?;
+        let srdf =
+            options.srdf.as_ref().map(|srdf| Ok::<_, RobotError>((srdf.clone(), text_of(srdf, MAX_BYTES)?)));
         let (geometry, base) = (options.geometry, options.base);
         Ok(Self { path: path.to_owned(), urdf, srdf: srdf.transpose()?, geometry, base })
     }

@@ -99,8 +99,10 @@ impl Robot {
         shapes: impl FnOnce(&Model, &[Element]) -> Result<Vec<OwnedShape>, RobotError>,
     ) -> Result<Self, RobotError> {
         let (model, mut elements) = urdf::read(&source.path, &source.urdf, source.geometry, source.base)?;
-        let semantics = match &source.srdf {
-            Some((path, text)) => srdf::read(path, text, &model)?,
+        let mut has_shape = vec![false; model.links.len()];
+        elements.iter().for_each(|element| has_shape[element.link] = true);
+        let mut semantics = match &source.srdf {
+            Some((path, text)) => srdf::read(path, text, &model, &has_shape)?,
             None => Semantics::default(),
         };
         let body = |link: &Link| {
@@ -115,9 +117,7 @@ impl Robot {
             let origin = link.origin.of(&element.origin);
             parts.push(Part::new(element.link, (link.group, false), origin, shape, 0.0)?);
         }
-        let disabled = semantics.disabled.iter();
-        let numbers = |[a, b]: &[String; 2]| Some([model.link(a).ok()?, model.link(b).ok()?]);
-        let allowed = disabled.filter_map(numbers).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        let allowed = std::mem::take(&mut semantics.disabled).into_iter().collect();
         let setting = Setting { model: Arc::new(model), parts, pairs: Vec::new(), bodies };
         let mut robot = Self {
             setting: Arc::new(setting),
@@ -157,6 +157,12 @@ impl Robot {
     /// Returns the names of the links, each after the link that it hangs from.
     pub fn links(&self) -> impl Iterator<Item = &str> {
         self.setting.model.links.iter().map(|link| link.name.as_str())
+    }
+
+    /// Returns what was passed over when the robot was read and may not be meant so, as sentences: names of links, joints and
+    /// groups in the SRDF that the robot does not have, for example. They begin with the file and the line.
+    pub fn warnings(&self) -> &[String] {
+        &self.semantics.warnings
     }
 
     /// Returns the groups of the SRDF.

@@ -1,37 +1,39 @@
-//! Makes the shapes of links: meshes from files, baked once for each content and scale, and primitives.
+//! Makes the shapes of links: meshes from files, each read and baked once, and primitives.
 
 use crate::collada;
 use crate::error::RobotError;
 use crate::frame::Point;
 use crate::options::RobotOptions;
-use crate::packages::find;
+use crate::packages::{find, folders_of};
 use crate::urdf::{Described, Element};
-use bvh_bake::input::mesh::Mesh;
-use bvh_bake::{BakeError, Options, read_meshes, shapes, to_bytes, write_atomically};
+use crate::xml::text_of;
+use bvh_bake::input::mesh::{Mesh, Object};
+use bvh_bake::{BakeError, Options, generator, read_meshes, shapes, to_bytes, write_atomically};
 use bvh_query::{Bvh, OwnedShape, QueryError};
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
+
+/// The most bytes of a COLLADA file, which is read as a whole. Its elements may take several times as much memory.
+const MAX_COLLADA_BYTES: u64 = 1 << 30;
 
 /// Makes shapes, and keeps those of meshes.
 pub(crate) struct Shapes<'a> {
     urdf: &'a Path,
     options: &'a RobotOptions,
+    /// The shapes of meshes, by what was read.
     baked: HashMap<u128, OwnedShape>,
+    /// The same shapes by where they were read, and with which scale.
+    placed: HashMap<(PathBuf, [u64; 3]), OwnedShape>,
 }
 
 impl<'a> Shapes<'a> {
     pub(crate) fn new(urdf: &'a Path, options: &'a RobotOptions) -> Self {
-        Self { urdf, options, baked: HashMap::new() }
+        Self { urdf, options, baked: HashMap::new(), placed: HashMap::new() }
     }
 
     /// Returns a shape of a link.
     pub(crate) fn make(&mut self, element: &Element, link: &str) -> Result<OwnedShape, RobotError> {
-        let refused = |source: BakeError| RobotError::Mesh {
-            path: self.urdf.to_owned(),
-            link: link.to_owned(),
-            source: Box::new(source),
-        };
         let shape = |error: bvh_bake::ShapeError| RobotError::Description {
             path: self.urdf.to_owned(),
             place: format!("link {link}"),
@@ -39,7 +41,8 @@ impl<'a> Shapes<'a> {
             found: error.to_string(),
         };
         let baked = |mesh: Mesh| -> Result<OwnedShape, RobotError> {
-            let (bytes, _) = to_bytes(&mesh, &Options::default()).map_err(refused)?;
+            let (bytes, _) =
+                to_bytes(&mesh, &Options::default()).map_err(|source| self.refused(link, source))?;
             Ok(Bvh::from_bytes(bytes).map_err(QueryError::from)?.into())
         };
         match element.shape {
@@ -58,74 +61,89 @@ impl<'a> Shapes<'a> {
     }
 
     fn mesh(&mut self, link: &str, uri: &str, scale: Point) -> Result<OwnedShape, RobotError> {
-        let path = find(uri, self.urdf, &self.options.packages).map_err(|tried| RobotError::NoMesh {
+        let named = find(uri, self.urdf, &self.options.packages).map_err(|tried| RobotError::NoMesh {
             path: self.urdf.to_owned(),
             link: link.to_owned(),
             uri: uri.to_owned(),
             tried,
         })?;
-        let content = std::fs::read(&path).map_err(|source| RobotError::Io { path: path.clone(), source })?;
-        let key = key(&content, &path, scale);
-        if let Some(shape) = self.baked.get(&key) {
+        if !named.is_inside && !self.options.allow_outside {
+            return Err(RobotError::Outside {
+                path: self.urdf.to_owned(),
+                link: link.to_owned(),
+                uri: uri.to_owned(),
+                folders: folders_of(self.urdf, &self.options.packages),
+                found: named.path,
+            });
+        }
+        // Links often share a mesh, which is read once.
+        let place = (named.path.clone(), scale.map(f64::to_bits));
+        if let Some(shape) = self.placed.get(&place) {
             return Ok(shape.clone());
         }
-        let cached = self.options.cache.as_ref().map(|folder| folder.join(format!("{key:032x}.cbvh")));
-        let shape = match cached.filter(|cached| cached.is_file()) {
-            Some(cached) => Bvh::read(&cached).map_err(|source| RobotError::Cache { source })?.into(),
-            None => self.bake(link, &path, &content, scale, key)?,
+        let mut mesh = self.read(link, &named.path)?;
+        rescale(&mut mesh, scale);
+        let key = key(&mesh);
+        let shape = match self.baked.get(&key) {
+            Some(shape) => shape.clone(),
+            None => self.baked(link, &mesh, key)?,
         };
-        self.baked.insert(key, OwnedShape::clone(&shape));
+        self.baked.insert(key, shape.clone());
+        self.placed.insert(place, shape.clone());
         Ok(shape)
     }
 
-    /// Bakes a mesh, and puts it into the cache.
-    fn bake(
-        &self,
-        link: &str,
-        path: &Path,
-        content: &[u8],
-        scale: Point,
-        key: u128,
-    ) -> Result<OwnedShape, RobotError> {
-        let refused = |source: BakeError| RobotError::Mesh {
-            path: self.urdf.to_owned(),
-            link: link.to_owned(),
-            source: Box::new(source),
-        };
-        let place = || format!("link {link}, {}", path.display());
-        let description = |expected: &'static str, found: String| RobotError::Description {
-            path: self.urdf.to_owned(),
-            place: place(),
-            expected,
-            found,
-        };
+    /// Reads a mesh.
+    fn read(&self, link: &str, path: &Path) -> Result<Mesh, RobotError> {
         let is_collada = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dae"));
-        let mut mesh = if is_collada {
-            let text = std::str::from_utf8(content).map_err(|error| error.to_string());
-            text.and_then(collada::read).map_err(|found| description("a COLLADA file", found))?
-        } else {
-            read_meshes(&[path.to_owned()]).map_err(refused)?.merged()
-        };
-        rescale(&mut mesh, scale);
-        let (bytes, _) = to_bytes(&mesh, &Options::default()).map_err(refused)?;
-        if let Some(folder) = &self.options.cache {
-            let file = folder.join(format!("{key:032x}.cbvh"));
+        if !is_collada {
+            return Ok(read_meshes(&[path.to_owned()])
+                .map_err(|source| self.refused(link, source))?
+                .merged());
+        }
+        let text = text_of(path, MAX_COLLADA_BYTES)?;
+        collada::read(&text).map_err(|found| RobotError::Description {
+            path: self.urdf.to_owned(),
+            place: format!("link {link}, {}", path.display()),
+            expected: "a COLLADA file",
+            found,
+        })
+    }
+
+    /// Takes a mesh from the folder of baked meshes, or bakes it and puts it there.
+    fn baked(&self, link: &str, mesh: &Mesh, key: u128) -> Result<OwnedShape, RobotError> {
+        let cached = self.options.cache.as_ref().map(|folder| folder.join(format!("{key:032x}.cbvh")));
+        if let Some(cached) = cached.as_ref().filter(|cached| cached.is_file()) {
+            return Ok(Bvh::read(cached).map_err(|source| RobotError::Cache { source })?.into());
+        }
+        let (bytes, _) = to_bytes(mesh, &Options::default()).map_err(|source| self.refused(link, source))?;
+        if let (Some(folder), Some(cached)) = (&self.options.cache, cached) {
             std::fs::create_dir_all(folder)
                 .map_err(|source| RobotError::Io { path: folder.clone(), source })?;
-            write_atomically(&file, &bytes).map_err(refused)?;
+            write_atomically(&cached, &bytes).map_err(|source| self.refused(link, source))?;
         }
         Ok(Bvh::from_bytes(bytes).map_err(QueryError::from)?.into())
     }
+
+    fn refused(&self, link: &str, source: BakeError) -> RobotError {
+        RobotError::Mesh { path: self.urdf.to_owned(), link: link.to_owned(), source: Box::new(source) }
+    }
 }
 
-/// Returns the key of a mesh in the cache: a hash of what its baked bytes depend on.
-fn key(content: &[u8], path: &Path, scale: Point) -> u128 {
+/// Returns the key of a mesh: a hash of all that its baked bytes depend on. The files that it was read from do not count: two of
+/// them may be equal and name others that are not.
+fn key(mesh: &Mesh) -> u128 {
     let mut hash = Xxh3::new();
-    hash.update(env!("CARGO_PKG_VERSION").as_bytes());
-    let extension = path.extension().unwrap_or_default();
-    hash.update(extension.to_ascii_lowercase().as_encoded_bytes());
-    scale.iter().for_each(|factor| hash.update(&factor.to_le_bytes()));
-    hash.update(content);
+    hash.update(generator().as_bytes());
+    hash.update(Options::default().stamp().as_bytes());
+    for Object { name, positions, triangles, triangle_ids } in &mesh.objects {
+        let counts = [name.len(), positions.len(), triangles.len(), triangle_ids.len()];
+        let mut bytes: Vec<u8> = counts.iter().flat_map(|&count| (count as u64).to_le_bytes()).collect();
+        bytes.extend_from_slice(name.as_bytes());
+        bytes.extend(positions.iter().flatten().flat_map(|coordinate| coordinate.to_le_bytes()));
+        bytes.extend(triangles.iter().flatten().chain(triangle_ids).flat_map(|number| number.to_le_bytes()));
+        hash.update(&bytes);
+    }
     hash.digest128()
 }
 

@@ -5,15 +5,18 @@ use crate::frame::Frame;
 use crate::model::Model;
 use crate::xml::{Description, children};
 use roxmltree::Node;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// What an SRDF says.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Semantics {
-    /// Pairs of links that are not asked about.
-    pub(crate) disabled: Vec<[String; 2]>,
+    /// Pairs of links that are not asked about, by number, the lower one first.
+    pub(crate) disabled: Vec<[usize; 2]>,
     pub(crate) groups: Vec<Group>,
     pub(crate) states: Vec<State>,
+    /// What is passed over.
+    pub(crate) warnings: Vec<String>,
 }
 
 /// A named group.
@@ -38,87 +41,197 @@ pub struct State {
     pub values: Vec<(usize, f64)>,
 }
 
-/// Reads the text of a file about a robot. Names of links and joints that the robot does not have are passed over, because files are often
-/// shared by variants of a robot.
-pub(crate) fn read(path: &Path, text: &str, model: &Model) -> Result<Semantics, RobotError> {
+/// The most places that all groups may have together. Groups may contain others again and again.
+const MAX_PLACES: usize = 1 << 22;
+
+/// What is read of a file, and the names that it may use.
+struct Reader<'a> {
+    description: &'a Description<'a>,
+    model: &'a Model,
+    links: HashMap<&'a str, usize>,
+    joints: HashMap<&'a str, usize>,
+    /// The places of the numbers that set a joint.
+    numbers: HashMap<&'a str, Vec<usize>>,
+    semantics: Semantics,
+    /// The groups by name.
+    groups: HashMap<String, usize>,
+    /// How many places all groups have.
+    places: usize,
+    /// The names that the robot does not have, with what they are of.
+    unknown: HashSet<(&'static str, &'a str)>,
+}
+
+/// The most names that warnings tell.
+const MAX_WARNINGS: usize = 100;
+
+/// Reads the text of a file about a robot. `has_shape` tells which links have shapes; pairs of others are never asked about. Names of
+/// links and joints that the robot does not have are passed over with a warning, because files are often shared by variants of a
+/// robot.
+pub(crate) fn read(
+    path: &Path,
+    text: &str,
+    model: &Model,
+    has_shape: &[bool],
+) -> Result<Semantics, RobotError> {
     let description = &Description::parse(path, text)?;
-    let of = |node, name| description.attribute(node, name).map(str::to_owned);
-    let mut semantics = Semantics::default();
-    let (mut enabled, mut silent) = (Vec::new(), Vec::new());
-    for node in description.root().children().filter(Node::is_element) {
-        let pair = || Ok::<_, RobotError>([of(node, "link1")?, of(node, "link2")?]);
-        match node.tag_name().name() {
-            "disable_collisions" => semantics.disabled.push(pair()?),
-            "enable_collisions" => enabled.push(pair()?),
-            "disable_default_collisions" => silent.push(of(node, "link")?),
-            "group" => {
-                let group = Group { name: of(node, "name")?, joints: joints(node, model, &semantics.groups) };
-                semantics.groups.push(group);
+    let mut numbers: HashMap<&str, Vec<usize>> = HashMap::new();
+    for (place, name) in model.numbers.iter().enumerate() {
+        numbers.entry(name).or_default().push(place);
+        if let Some((joint, _)) = name.rsplit_once('/') {
+            numbers.entry(joint).or_default().push(place);
+        }
+    }
+    let links = model.links.iter().zip(0..).map(|(link, number)| (link.name.as_str(), number)).collect();
+    let joints = model.joints.iter().zip(0..).map(|(joint, number)| (joint.name.as_str(), number)).collect();
+    let (semantics, groups) = (Semantics::default(), HashMap::new());
+    let unknown = HashSet::new();
+    let reader = Reader { description, model, links, joints, numbers, semantics, groups, places: 0, unknown };
+    reader.read(has_shape)
+}
+
+impl<'a> Reader<'a> {
+    fn read(mut self, has_shape: &[bool]) -> Result<Semantics, RobotError> {
+        let description = self.description;
+        let (mut enabled, mut silent) = (HashSet::new(), Vec::new());
+        for node in description.root().children().filter(Node::is_element) {
+            match node.tag_name().name() {
+                "disable_collisions" => {
+                    let pair = self.pair(node)?;
+                    self.semantics.disabled.extend(pair);
+                }
+                "enable_collisions" => enabled.extend(self.pair(node)?),
+                "disable_default_collisions" => silent.extend(self.link(node, "link")?),
+                "group" => self.group(node)?,
+                "group_state" => self.state(node)?,
+                _ => {}
             }
-            "group_state" => {
-                let mut values = Vec::new();
-                for joint in children(node, "joint") {
-                    let (name, text) = (of(joint, "name")?, of(joint, "value")?);
-                    let of_joint = numbers_of(model, &name);
-                    for (place, text) in of_joint.into_iter().zip(text.split_whitespace()) {
-                        let value = text.parse().ok().filter(|value: &f64| value.is_finite());
-                        let value = value.ok_or_else(|| description.error(joint, "finite numbers", text))?;
-                        values.push((place, value));
+        }
+        silent.sort_unstable();
+        silent.dedup();
+        let with_shape: Vec<usize> = (0..has_shape.len()).filter(|&link| has_shape[link]).collect();
+        for one in silent.into_iter().filter(|&link| has_shape[link]) {
+            let pairs = with_shape
+                .iter()
+                .filter(|other| **other != one)
+                .map(|&other| [one.min(other), one.max(other)]);
+            self.semantics.disabled.extend(pairs.filter(|pair| !enabled.contains(pair)));
+        }
+        Ok(self.semantics)
+    }
+
+    fn attribute(&self, node: Node<'a, 'a>, name: &'static str) -> Result<&'a str, RobotError> {
+        self.description.attribute(node, name)
+    }
+
+    /// Warns of a name that the robot does not have.
+    fn unknown(&mut self, node: Node<'_, '_>, what: &'static str, name: &'a str) {
+        // The place in the file takes time to find, and a reader has no use for thousands.
+        if self.unknown.len() > MAX_WARNINGS || !self.unknown.insert((what, name)) {
+            return;
+        }
+        let warning = if self.unknown.len() <= MAX_WARNINGS {
+            format!("the robot has no {what} '{name}', which is passed over")
+        } else {
+            "the robot has not this name and maybe others, which are passed over".to_owned()
+        };
+        self.semantics.warnings.push(self.description.warning(node, warning));
+    }
+
+    /// Returns the number of the link that an attribute names, if the robot has it.
+    fn link(&mut self, node: Node<'a, 'a>, attribute: &'static str) -> Result<Option<usize>, RobotError> {
+        let name = self.attribute(node, attribute)?;
+        let link = self.links.get(name).copied();
+        if link.is_none() {
+            self.unknown(node, "link", name);
+        }
+        Ok(link)
+    }
+
+    /// Returns a pair of links, if the robot has both.
+    fn pair(&mut self, node: Node<'a, 'a>) -> Result<Option<[usize; 2]>, RobotError> {
+        let ends = [self.link(node, "link1")?, self.link(node, "link2")?];
+        Ok(if let [Some(a), Some(b)] = ends { Some([a.min(b), a.max(b)]) } else { None })
+    }
+
+    /// Reads a group: the joints named, those of links and of chains, and those of other groups.
+    fn group(&mut self, group: Node<'a, 'a>) -> Result<(), RobotError> {
+        let (name, model) = (self.attribute(group, "name")?.to_owned(), self.model);
+        let mut places = Vec::new();
+        for child in group.children().filter(Node::is_element) {
+            let mut joints = Vec::new();
+            match child.tag_name().name() {
+                "joint" => {
+                    let name = self.attribute(child, "name")?;
+                    joints.extend(self.joints.get(name));
+                    // Fixed joints are not in the model.
+                    if joints.is_empty() && !model.fixed.contains(name) {
+                        self.unknown(child, "joint", name);
                     }
                 }
-                semantics.states.push(State { name: of(node, "name")?, group: of(node, "group")?, values });
+                // The joint that moves it, if that is not fixed.
+                "link" => {
+                    let moved = self.link(child, "name")?.map(|link| &model.links[link]);
+                    let moved = moved.filter(|link| link.origin == Frame::IDENTITY);
+                    joints.extend(moved.and_then(|link| model.groups[link.group]));
+                }
+                "chain" => {
+                    let ends = [self.link(child, "base_link")?, self.link(child, "tip_link")?];
+                    let [base, tip] = ends
+                        .map(|link| link.into_iter().flat_map(|link| model.above(model.links[link].group)));
+                    let base: HashSet<usize> = base.collect();
+                    joints.extend(tip.filter(|joint| !base.contains(joint)));
+                    self.places += base.len();
+                }
+                "group" => {
+                    let name = self.attribute(child, "name")?;
+                    match self.groups.get(name) {
+                        Some(&other) => places.extend(&self.semantics.groups[other].joints),
+                        None => self.unknown(child, "group above this one", name),
+                    }
+                }
+                _ => {}
             }
-            _ => {}
-        }
-    }
-    for one in &silent {
-        for other in model.links.iter().filter(|link| link.name != *one) {
-            let is_enabled = |pair: &[String; 2]| pair.contains(one) && pair.contains(&other.name);
-            if !enabled.iter().any(is_enabled) {
-                semantics.disabled.push([one.clone(), other.name.clone()]);
+            let of_joint =
+                |joint: usize| self.numbers.get(model.joints[joint].name.as_str()).into_iter().flatten();
+            places.extend(joints.into_iter().flat_map(of_joint));
+            if self.places + places.len() > MAX_PLACES {
+                let found = format!("more, in group {name}");
+                return Err(self.description.error(
+                    child,
+                    "groups of at most 4194304 joints together",
+                    found,
+                ));
             }
         }
+        places.sort_unstable();
+        places.dedup();
+        self.places += places.len() + 1;
+        self.groups.entry(name.clone()).or_insert(self.semantics.groups.len());
+        self.semantics.groups.push(Group { name, joints: places });
+        Ok(())
     }
-    Ok(semantics)
-}
 
-/// Returns the places of the numbers that set a joint.
-fn numbers_of(model: &Model, joint: &str) -> Vec<usize> {
-    let is_of =
-        |name: &String| name == joint || name.strip_prefix(joint).is_some_and(|rest| rest.starts_with('/'));
-    (0..model.numbers.len()).filter(|&place| is_of(&model.numbers[place])).collect()
-}
-
-/// Returns the places of the joints of a group: those named, those of links and of chains, and those of other groups.
-fn joints(group: Node<'_, '_>, model: &Model, groups: &[Group]) -> Vec<usize> {
-    let mut places = Vec::new();
-    let mut of_joint = |joint: usize| places.extend(numbers_of(model, &model.joints[joint].name));
-    let group_of = |link: &str| model.link(link).ok().map(|link| model.links[link].group);
-    let above = |link: &str| group_of(link).into_iter().flat_map(|group| model.above(group));
-    let mut others = Vec::new();
-    for child in group.children().filter(Node::is_element) {
-        let of = |name: &str| child.attribute(name).unwrap_or_default();
-        match child.tag_name().name() {
-            "joint" => {
-                let joint = model.joints.iter().position(|joint| joint.name == of("name"));
-                joint.into_iter().for_each(&mut of_joint);
+    /// Reads a named configuration.
+    fn state(&mut self, node: Node<'a, 'a>) -> Result<(), RobotError> {
+        let mut values = Vec::new();
+        for joint in children(node, "joint") {
+            let (name, text) = (self.attribute(joint, "name")?, self.attribute(joint, "value")?);
+            let Some(of_joint) = self.numbers.get(name) else {
+                // Fixed joints have no numbers, and mimic joints have those of others.
+                if !self.model.fixed.contains(name) && !self.joints.contains_key(name) {
+                    self.unknown(joint, "joint", name);
+                }
+                continue;
+            };
+            for (&place, text) in of_joint.iter().zip(text.split_whitespace()) {
+                let value = text.parse().ok().filter(|value: &f64| value.is_finite());
+                let value = value.ok_or_else(|| self.description.error(joint, "finite numbers", text))?;
+                values.push((place, value));
             }
-            // The joint that moves it, if that is not fixed.
-            "link" => {
-                let moved = model.link(of("name")).ok().map(|link| &model.links[link]);
-                let moved = moved.filter(|link| link.origin == Frame::IDENTITY);
-                moved.and_then(|link| model.groups[link.group]).into_iter().for_each(&mut of_joint);
-            }
-            "chain" => {
-                let base: Vec<usize> = above(of("base_link")).collect();
-                above(of("tip_link")).filter(|joint| !base.contains(joint)).for_each(&mut of_joint);
-            }
-            "group" => others.extend(groups.iter().find(|other| other.name == of("name"))),
-            _ => {}
         }
+        let (name, group) =
+            (self.attribute(node, "name")?.to_owned(), self.attribute(node, "group")?.to_owned());
+        self.semantics.states.push(State { name, group, values });
+        Ok(())
     }
-    places.extend(others.iter().flat_map(|other| &other.joints));
-    places.sort_unstable();
-    places.dedup();
-    places
 }

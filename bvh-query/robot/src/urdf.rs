@@ -14,6 +14,8 @@ use std::path::Path;
 
 /// The name of the joint between the world and a base that moves.
 const BASE: &str = "base";
+/// The most mimic joints of which each mimics the next one. This bounds the work for each, too.
+const MAX_MIMICS: usize = 64;
 const PLANAR: [&str; 3] = ["x", "y", "theta"];
 const FLOATING: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 
@@ -102,6 +104,7 @@ impl<'a> Urdf<'a> {
             joints: Vec::new(),
             numbers: Vec::new(),
             limits: Vec::new(),
+            fixed: HashSet::new(),
         };
         let moving = match base {
             Base::Fixed => None,
@@ -140,7 +143,10 @@ impl<'a> Urdf<'a> {
                 let origin = place.of(&self.origin(joint.node)?);
                 let (group, origin) = match self.kind(joint, &by_name, &origin)? {
                     Some(kind) => (model.add_joint(joint.name, group, origin, kind), Frame::IDENTITY),
-                    None => (group, origin),
+                    None => {
+                        model.fixed.insert(joint.name.to_owned());
+                        (group, origin)
+                    }
                 };
                 model.links.push(Link { name: links[joint.child].to_owned(), group, origin });
                 next.push((joint.child, group, origin));
@@ -224,8 +230,9 @@ impl<'a> Urdf<'a> {
             let next = joints.get(name).filter(|other| other.is_single());
             leader = next.ok_or_else(|| of.error(mimic, "a joint that turns or slides", name))?;
             steps += 1;
-            if steps > joints.len() {
-                return Err(of.error(mimic, "a joint to mimic", "joints that mimic each other"));
+            if steps > MAX_MIMICS {
+                let expected = "a joint at most 64 mimic joints away from the one that it follows";
+                return Err(of.error(mimic, expected, "joints that mimic each other, or more of them"));
             }
         }
         let by = Value { number: leader.number, factor, offset };

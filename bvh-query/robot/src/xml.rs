@@ -2,6 +2,9 @@
 
 use crate::error::RobotError;
 use roxmltree::{Document, Node};
+use std::fmt::Display;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// A description in XML, with the element `robot` at its root.
@@ -10,9 +13,34 @@ pub(crate) struct Description<'a> {
     document: Document<'a>,
 }
 
-/// Reads a file.
-pub(crate) fn text_of(path: &Path) -> Result<String, RobotError> {
-    std::fs::read_to_string(path).map_err(|source| RobotError::Io { path: path.to_owned(), source })
+/// The elements of URDF and SRDF files that are read. Others are extensions of other programs.
+const READ: [&str; 7] = [
+    "link",
+    "joint",
+    "group",
+    "group_state",
+    "disable_collisions",
+    "enable_collisions",
+    "disable_default_collisions",
+];
+
+/// The most bytes of a URDF or SRDF file. The largest that are in use have some MiB.
+pub(crate) const MAX_BYTES: u64 = 64 << 20;
+
+/// Reads a file of at most so many bytes.
+pub(crate) fn text_of(path: &Path, most: u64) -> Result<String, RobotError> {
+    let failed = |source| RobotError::Io { path: path.to_owned(), source };
+    let mut text = String::new();
+    let read = File::open(path).and_then(|file| file.take(most + 1).read_to_string(&mut text));
+    // A character may be cut in two.
+    if text.len() as u64 > most || read.as_ref().is_err_and(|_| is_longer(path, most)) {
+        return Err(RobotError::TooLong { path: path.to_owned(), most });
+    }
+    read.map(|_| text).map_err(failed)
+}
+
+fn is_longer(path: &Path, most: u64) -> bool {
+    std::fs::metadata(path).is_ok_and(|metadata| metadata.len() > most)
 }
 
 impl<'a> Description<'a> {
@@ -25,10 +53,44 @@ impl<'a> Description<'a> {
         };
         let document = Document::parse(text).map_err(|found| description("XML", found.to_string()))?;
         let root = document.root_element();
-        if !root.has_tag_name("robot") {
-            return Err(description("the element <robot>", format!("<{}>", root.tag_name().name())));
+        let name = root.tag_name().name();
+        if name != "robot" {
+            let what = match name {
+                "sdf" => ", an SDF file; convert it to URDF",
+                "mujoco" | "mujocoinclude" => ", an MJCF file; convert it to URDF",
+                _ => "",
+            };
+            return Err(description("the element <robot>", format!("<{name}>{what}")));
         }
-        Ok(Self { path, document })
+        let description = Self { path, document };
+        description.refuse_xacro()?;
+        Ok(description)
+    }
+
+    /// Refuses what xacro would have replaced: its elements, and expressions where they would matter.
+    fn refuse_xacro(&self) -> Result<(), RobotError> {
+        let expected = "a description without macros; run xacro on the file first";
+        let is_expression = |text: &str| text.contains("${") || text.contains("$(");
+        for part in self.root().children().filter(Node::is_element) {
+            let is_read = READ.contains(&part.tag_name().name());
+            for node in part.descendants().filter(Node::is_element) {
+                if node.tag_name().namespace().is_some_and(|namespace| namespace.contains("xacro")) {
+                    return Err(self.error(node, expected, format!("<xacro:{}>", node.tag_name().name())));
+                }
+                let expression = node.attributes().find(|of| is_read && is_expression(of.value()));
+                if let Some(attribute) = expression {
+                    let found = format!("{}=\"{}\"", attribute.name(), attribute.value());
+                    return Err(self.error(node, expected, found));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns a warning about an element.
+    pub(crate) fn warning(&self, node: Node<'_, '_>, what: impl Display) -> String {
+        let row = self.document.text_pos_at(node.range().start).row;
+        shown(&format!("{}: line {row}, <{}>: {what}", self.path.display(), node.tag_name().name()))
     }
 
     pub(crate) fn root(&self) -> Node<'_, 'a> {
@@ -45,8 +107,8 @@ impl<'a> Description<'a> {
         let line = self.document.text_pos_at(node.range().start).row;
         let named = node.ancestors().find_map(|of| Some((of.tag_name().name(), of.attribute("name")?)));
         let of = named.map_or(String::new(), |(kind, name)| format!(", {kind} {name}"));
-        let place = format!("line {line}{of}, <{}>", node.tag_name().name());
-        RobotError::Description { path: self.path.to_owned(), place, expected, found: found.into() }
+        let place = shown(&format!("line {line}{of}, <{}>", node.tag_name().name()));
+        RobotError::Description { path: self.path.to_owned(), place, expected, found: shown(&found.into()) }
     }
 
     /// Returns an attribute that has to be there.
@@ -77,6 +139,13 @@ impl<'a> Description<'a> {
         let found = self.numbers(node, name)?;
         found.map(|[number]| number).ok_or_else(|| self.error(node, name, "no such attribute"))
     }
+}
+
+/// Escapes control characters, so that no name in a file begins a line of a message.
+fn shown(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_control() { c.escape_unicode().to_string() } else { c.to_string() })
+        .collect()
 }
 
 /// Returns the children of an element that have a name.

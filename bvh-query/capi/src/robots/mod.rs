@@ -65,6 +65,10 @@ unsafe fn choices(pointer: *const RobotChoices) -> Result<RobotOptions, Failure>
             return Err(Failure::argument("options.cylinder_error", "0 or a finite number above 0", error));
         }
     }
+    if given.reserved != 0 {
+        return Err(Failure::argument("options.reserved", 0, given.reserved));
+    }
+    options.allow_outside = flag("options.allow_outside", given.allow_outside)?;
     if flag("options.visual", given.visual)? {
         options.geometry = Geometry::Visual;
     }
@@ -133,6 +137,7 @@ about! {
     text cbvh_robot_name() = robot.name();
     text cbvh_robot_joint_name(number: usize,) =
         found("joint value", number, robot.joints().get(number))?;
+    text cbvh_robot_warning(number: usize,) = found("warning", number, robot.warnings().get(number))?;
     text cbvh_robot_group_name(number: usize,) = &found("group", number, robot.groups().get(number))?.name;
     text cbvh_robot_state_name(number: usize,) = &found("state", number, robot.states().get(number))?.name;
     text cbvh_robot_state_group(number: usize,) = &found("state", number, robot.states().get(number))?.group;

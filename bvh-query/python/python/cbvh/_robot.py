@@ -96,6 +96,7 @@ class Robot:
         base: Literal["fixed", "planar", "floating"] = "fixed",
         cylinder_error: float = 1e-3,
         cache: str | os.PathLike[str] | None = None,
+        allow_outside: bool = False,
     ) -> Robot:
         """Reads a URDF file and bakes the shapes of all links: OBJ, STL, PLY, glTF and COLLADA meshes, and primitives.
 
@@ -103,6 +104,9 @@ class Robot:
         Pairs of links that ``srdf`` disables are not asked about. A ``base`` that moves adds joint values: ``base/x``,
         ``base/y`` and ``base/theta``, or ``base/x`` to ``base/z`` and a quaternion, ``base/qx`` to ``base/qw``. A cylinder is a
         prism around it, wider by at most ``cylinder_error`` of its radius. ``cache`` names a folder for baked meshes.
+
+        Meshes must be in the folder above that of the file or below it, in its package, in a package that a ``package://`` path
+        names, or in ``package_dirs``; ``allow_outside=True`` lets the file name any. What is passed over is in `warnings`.
 
         Raises ValueError for a description that is not as it should be, FileNotFoundError and BakeError for its meshes.
         """
@@ -123,6 +127,7 @@ class Robot:
                 base,
                 float(cylinder_error),
                 None if cache is None else os.fspath(cache),
+                bool(allow_outside),
             )
         )
 
@@ -168,6 +173,12 @@ class Robot:
     def links(self) -> list[str]:
         """The names of the links, each after the link that it hangs from."""
         return self._robot.links()
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was passed over when the robot was read and may not be meant so: names in the SRDF that the robot does not have,
+        for example. Each is a sentence that begins with the file and the line."""
+        return self._robot.warnings()
 
     @property
     def groups(self) -> dict[str, list[str]]:
