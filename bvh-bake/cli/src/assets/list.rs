@@ -221,16 +221,73 @@ pub(super) fn read_folder(
         let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf, .glb, .xyz or .pcd, found none";
         return Err(Failure::system(folder, what));
     }
-    let asset = |(line, input): (u64, PathBuf)| {
-        let below = input.strip_prefix(folder).unwrap_or(&input);
-        let output = output.join(below).with_extension("cbvh");
+    let below: Vec<&Path> = inputs.iter().map(|input| input.strip_prefix(folder).unwrap_or(input)).collect();
+    let outputs: Vec<PathBuf> = distinct_outputs(&below).iter().map(|below| output.join(below)).collect();
+    let asset = |(line, (input, output)): (u64, (PathBuf, PathBuf))| {
         let [named_input, named_output] = [&input, &output].map(|path| path.display().to_string());
         Asset { line, input, output, named_input, named_output, options: options.clone() }
     };
     let mut known = 0;
-    let assets = (1..).zip(inputs).map(asset).map(|asset| {
+    let assets = (1..).zip(inputs.into_iter().zip(outputs)).map(asset).map(|asset| {
         known += asset.bytes();
         require_memory(folder, known, max_memory).map(|()| asset)
     });
     assets.collect()
+}
+
+/// Returns an output for each input of a folder: `part.cbvh` for `part.obj`, or `part.obj.cbvh` where another input would
+/// have the same output. This depends on nothing but the names. The case of letters does not tell outputs apart, because
+/// on some systems it does not tell files apart.
+fn distinct_outputs(inputs: &[&Path]) -> Vec<PathBuf> {
+    let long = |input: &Path| {
+        let mut name = input.as_os_str().to_owned();
+        name.push(".cbvh");
+        PathBuf::from(name)
+    };
+    let mut outputs: Vec<PathBuf> = inputs.iter().map(|input| input.with_extension("cbvh")).collect();
+    loop {
+        let mut by_name: HashMap<String, Vec<usize>> = HashMap::new();
+        for (number, output) in outputs.iter().enumerate() {
+            by_name.entry(output.to_string_lossy().to_lowercase()).or_default().push(number);
+        }
+        // A long name may be the short one of a third input, which then gets its own long one.
+        let shared = by_name.into_values().filter(|numbers| numbers.len() > 1).flatten();
+        let to_lengthen: Vec<usize> =
+            shared.filter(|&number| outputs[number] != long(inputs[number])).collect();
+        if to_lengthen.is_empty() {
+            return outputs;
+        }
+        to_lengthen.into_iter().for_each(|number| outputs[number] = long(inputs[number]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outputs(inputs: &[&str]) -> Vec<String> {
+        let inputs: Vec<&Path> = inputs.iter().map(Path::new).collect();
+        distinct_outputs(&inputs).iter().map(|path| path.display().to_string().replace('\\', "/")).collect()
+    }
+
+    #[test]
+    fn only_outputs_that_clash_keep_the_extension_of_their_input() {
+        let inputs = ["a/part.obj", "a/part.stl", "b/part.obj", "c.d.ply", "rock.obj"];
+        let expected = ["a/part.obj.cbvh", "a/part.stl.cbvh", "b/part.cbvh", "c.d.cbvh", "rock.cbvh"];
+        assert_eq!(outputs(&inputs), expected);
+    }
+
+    #[test]
+    fn a_long_name_may_be_the_short_one_of_another_input() {
+        let expected = ["part.obj.cbvh", "part.obj.stl.cbvh", "part.stl.cbvh"];
+        assert_eq!(outputs(&["part.obj", "part.obj.stl", "part.stl"]), expected);
+        assert_eq!(outputs(&["x.cbvh.stl", "x.stl"]), ["x.cbvh.cbvh", "x.cbvh"]);
+    }
+
+    #[test]
+    fn the_case_of_letters_does_not_tell_outputs_apart() {
+        assert_eq!(outputs(&["Part.STL", "part.obj"]), ["Part.STL.cbvh", "part.obj.cbvh"]);
+        // Where there are both, the system tells them apart.
+        assert_eq!(outputs(&["Part.obj", "part.obj"]), ["Part.obj.cbvh", "part.obj.cbvh"]);
+    }
 }

@@ -156,6 +156,9 @@ fn bytes_are_those_of_single_bakes() {
     }
 }
 
+const PLY_TRIANGLE: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+
 #[test]
 fn a_folder_is_baked_as_a_tree() {
     let directory = &place();
@@ -176,9 +179,22 @@ fn a_folder_is_baked_as_a_tree() {
     assert_eq!(outputs, ["out/a.cbvh", "out/deep/b.cbvh", "out/deep/er/c.cbvh"].map(native));
     let text = directory.cbvh("bake in -o out").done().out;
     assert!(text.starts_with("3 assets: 0 baked, 3 up to date, 0 failed\n"), "{text}");
+    // One part in two formats: both are baked, under names of their own, and so is everything else.
+    fs::remove_file(directory.join("out/a.cbvh")).unwrap();
+    directory.write("in/a.ply", PLY_TRIANGLE);
+    let summary = directory.cbvh("bake in -o out --json").done();
+    counts(&summary.json(), 4, 2, 2, 0);
+    assert_eq!(names(&directory.join("out")), ["a.obj.cbvh", "a.ply.cbvh", "deep"]);
+    for (output, input) in [("out/a.obj.cbvh", "in/a.obj"), ("out/a.ply.cbvh", "in/a.ply")] {
+        cbvh_in(directory, &["verify", output, input]).done();
+    }
     directory.write("in/a.ply", "");
-    let words = ["out/a.cbvh", "used by asset 1 (in/a", "and by asset 2 (in/a"].map(native);
-    directory.cbvh("bake in -o out").failed(3, &words.each_ref().map(String::as_str));
+    let ended = directory.cbvh("bake in -o out --json");
+    counts(&ended.json(), 4, 0, 3, 1);
+    assert_eq!(ended.code, 3, "{ended:?}");
+    let told: Vec<&str> = ended.err.lines().collect();
+    assert!(told.len() == 2 && told[0].contains(&native("in/a.ply")), "{ended:?}");
+    assert_eq!(told[1], "cbvh: 1 of 4 assets failed");
     directory.cbvh("bake in -o o.jsonl").failed(1, &["o.jsonl", "expected a folder"]);
     fs::create_dir(directory.join("empty")).unwrap();
     directory.cbvh("bake empty -o out").failed(2, &["empty: expected a mesh or a folder with"]);
