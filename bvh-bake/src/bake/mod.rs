@@ -1,6 +1,7 @@
 //! Bakes a mesh into the bytes of a file, stage by stage.
 
 pub(crate) mod files;
+mod object;
 pub(crate) mod provenance;
 pub(crate) mod report;
 
@@ -8,27 +9,24 @@ use crate::check::prove::prove;
 use crate::error::{BakeError, LimitError, excerpt};
 use crate::input::gather::Gatherer;
 use crate::input::mesh::{Instance, Mesh};
-use crate::options::{Effort, Options};
-use crate::pages::Style;
+use crate::options::Options;
 use crate::pages::assemble::{Contents, assemble};
-use crate::pages::brick::{EncodedObject, encode_object};
-use crate::prepare::duplicates::Found;
-use crate::prepare::layout_choice::{self, Choice};
-use crate::prepare::quantization::{advised_error, grid_error};
-use crate::prepare::{measure, survey};
+use crate::pages::brick::EncodedObject;
+use crate::pages::unnumbered::ObjectPages;
+use crate::prepare::quantization::grid_error;
 use crate::progress::{Progress, Stage, Step};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::resources::Resources;
-use crate::topology::{MAX_FEW_PARTS, Nets, Survey, TopologyLists};
-use crate::tree::{Aabb, Bricks};
-use crate::triangles::{Gathered, Kept};
-use bvh_format::object::{F16_EXPONENTS, MAX_RADIUS, ObjectRecord};
+use crate::threads::prelude::*;
+use crate::topology::TopologyLists;
+use crate::triangles::Gathered;
+use bvh_format::object::{MAX_RADIUS, ObjectRecord};
 use bvh_format::page::MAX_PAGES;
+use object::{Built, Prepared, Shared, next_batch};
 use report::{BakeReport, FileSummary};
 use std::path::Path;
 use std::time::Instant;
-use zerocopy::FromZeros;
 
 /// Bakes a mesh into the bytes of a `.cbvh` file.
 ///
@@ -89,22 +87,24 @@ fn bake(
     let gathered = gatherer.finish(|name, diagonal| grid_error(options, name, diagonal))?;
     resources.progress.expect(triangles);
     let mut baker = Baker::new(options, instances, id_end, resources);
-    for object in gathered {
-        begin(Stage::Prepare);
-        baker.add(object, begin)?;
+    let mut gathered = gathered.into_iter().peekable();
+    while gathered.peek().is_some() {
+        baker.add(next_batch(&mut gathered), begin)?;
     }
     baker.finish(provenance, output, begin)
 }
 
-/// Bakes one object after another.
+/// Collects the objects that are baked.
 struct Baker<'a> {
-    options: &'a Options,
-    resources: &'a Resources,
-    /// Whether the file states which objects are closed.
-    has_topology: bool,
-    /// One more than the largest triangle id.
-    id_count: u64,
-    contents: Contents,
+    shared: Shared<'a>,
+    /// The pairs (kept id, id of an equal triangle that is left out) of all objects.
+    duplicates: Sorter<[u32; 2]>,
+    instances: Vec<Instance>,
+    records: Vec<(String, ObjectRecord)>,
+    objects: Vec<ObjectPages>,
+    topology: TopologyLists,
+    /// The number of pages of all objects so far.
+    pages: usize,
     /// The reason for the layout of the first object.
     reason: Option<String>,
     /// The smallest advised error of the objects whose allowed error is coarse.
@@ -120,20 +120,21 @@ struct Baker<'a> {
 impl<'a> Baker<'a> {
     fn new(options: &'a Options, instances: Vec<Instance>, id_count: u64, resources: &'a Resources) -> Self {
         let has_solids = options.solid || instances.iter().any(|instance| instance.solid);
-        let contents = Contents {
-            records: Vec::new(),
-            objects: Vec::new(),
-            instances,
-            topology: TopologyLists::new(),
-            duplicates: Sorter::of_runs(resources.sorted_at_once::<[u32; 2]>(id_count)),
-            spill: resources.scratch.spill(),
-        };
-        Self {
+        let shared = Shared {
             options,
             resources,
             has_topology: options.topology || has_solids,
             id_count,
-            contents,
+            spill: resources.scratch.spill(),
+        };
+        Self {
+            shared,
+            duplicates: Sorter::of_runs(resources.sorted_at_once::<[u32; 2]>(id_count)),
+            instances,
+            records: Vec::new(),
+            objects: Vec::new(),
+            topology: TopologyLists::new(),
+            pages: 0,
             reason: None,
             advised_max_error: None,
             vertices: 0,
@@ -144,96 +145,54 @@ impl<'a> Baker<'a> {
         }
     }
 
-    /// Bakes an object up to its pages.
-    fn add(&mut self, prepared: Gathered, begin: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
-        let Self { options, resources, has_topology, .. } = *self;
-        let Gathered { name, origin, stream, moved, vertices, is_cloud } = prepared;
-        let Contents { duplicates, spill, topology, .. } = &mut self.contents;
-        let before = duplicates.count();
-        // The edges of points do not count.
-        let is_counted = has_topology && !(is_cloud && stream.count > MAX_FEW_PARTS);
-        let mut nets = is_counted.then(|| Nets::new(resources));
-        let measured = measure(&stream, is_cloud, resources, |found| match (found, &mut nets) {
-            (Found::Pair(pair), _) => duplicates.extend(&[pair], spill),
-            (Found::Net { id, net, corners }, Some(nets)) => nets.add(id, net, corners, spill),
-            (Found::Net { .. }, None) => Ok(()),
-        })?;
-        let left_out = duplicates.count() - before;
-        let moved = moved.joined(measured.moved).rounded_up();
-        let advised = advised_error(options, diagonal(&measured.bounds), stream.count);
-        self.advised_max_error = self.advised_max_error.into_iter().chain(advised).reduce(f64::min);
-        let kept = Kept::new(&stream, &measured.dropped);
-        let mut surveyed = survey(&kept, &measured, resources)?;
-        self.triangles += stream.count;
-        resources.progress.leave_out(left_out);
-        resources.progress.reach(Step::Bake(Stage::Prepare), self.triangles);
+    /// Bakes objects up to their pages. Of several failures, that of the first object is returned.
+    fn add(&mut self, batch: Vec<Gathered>, begin: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
+        let (shared, progress) = (&self.shared, &self.shared.resources.progress);
+        begin(Stage::Prepare);
+        let prepared: Vec<_> = batch.into_par_iter().map(|object| Prepared::new(object, shared)).collect();
+        let mut prepared: Vec<Prepared> = prepared.into_iter().collect::<Result<_, _>>()?;
+        for object in &mut prepared {
+            if let Some(duplicates) = object.duplicates.take() {
+                self.duplicates.append(duplicates, &shared.spill)?;
+            }
+            self.advised_max_error =
+                self.advised_max_error.into_iter().chain(object.advised_error).reduce(f64::min);
+            self.triangles += object.triangles();
+            progress.leave_out(object.left_out);
+        }
+        progress.reach(Step::Bake(Stage::Prepare), self.triangles);
         begin(Stage::Build);
-        let f16_exponent = f16_exponent(&measured.bounds);
-        let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
-        // Points have no extent, so that finer splits make no better tree of them.
-        let effort = if is_cloud { Effort::Fast } else { options.effort };
-        let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, effort, resources)?;
-        let triangles = kept.count();
-        drop(stream);
-        let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles));
-        let (tree, of_brick) = bricks.first_tree(resources)?;
-        let Choice { profile, encoding, reason } =
-            layout_choice::choose(triangles, tree, of_brick, is_cloud, options);
-        let style = Style {
-            profile,
-            encoding,
-            f16_scale: 2f32.powi(f16_exponent),
-            ids: options.ids,
-            is_cloud,
-            turning_slabs: options.turning_slabs && profile.has_turning_slabs() && !is_cloud,
-        };
-        if has_topology && survey.is_none() {
-            topology.add_cloud();
-        }
-        let encoded = encode_object(bricks, style, survey, topology, resources)?;
-        if options.solid && !topology.is_closed(topology.records.len() - 1) {
-            return Err(BakeError::NotClosed { object: excerpt(name.as_bytes()) });
-        }
-        let EncodedObject { pages, packets, treelets, children } = encoded;
-        self.kept += triangles;
-        resources.progress.reach(Step::Bake(Stage::Build), self.kept);
-        let (first_page, page_count) = (self.contents.page_count(), pages.page_count());
-        if (first_page + page_count) as u64 > MAX_PAGES {
+        let built: Vec<_> = prepared.into_par_iter().map(|object| Built::new(object, shared)).collect();
+        built.into_iter().try_for_each(|object| self.push(object?))?;
+        self.shared.resources.progress.reach(Step::Bake(Stage::Build), self.kept);
+        Ok(())
+    }
+
+    /// Adds an object after all others.
+    fn push(&mut self, object: Built) -> Result<(), BakeError> {
+        let Built { name, mut record, encoded, reason, vertices } = object;
+        let EncodedObject { pages, packets, treelets, children, topology } = encoded;
+        let page_count = pages.page_count();
+        if (self.pages + page_count) as u64 > MAX_PAGES {
             return Err(LimitError::Pages.into());
         }
         if packets >= 1 << 30 {
             return Err(LimitError::Packets.into());
         }
-        let record = ObjectRecord {
-            origin: origin.map(Into::into),
-            box_lo: [0, 1, 2].map(|a| measured.bounds.lo(a).into()),
-            box_hi: [0, 1, 2].map(|a| measured.bounds.hi(a).into()),
-            triangles: triangles.into(),
-            packets: packets.into(),
-            treelets: treelets.into(),
-            first_page: (first_page as u32).into(),
-            pages: (page_count as u32).into(),
-            max_vertex_rounding: moved.rounding.into(),
-            max_quantization_error: moved.quantization.into(),
-            input_triangles: self.id_count.into(),
-            degenerate: surveyed.degenerate.into(),
-            duplicates: left_out.into(),
-            f16_exponent: f16_exponent.into(),
-            profile: style.profile.number(),
-            triangle_encoding: style.encoding as u8,
-            sphere_centre: surveyed.centre.map(Into::into),
-            sphere_radius: surveyed.radius.into(),
-            // -0.0 + 0.0 is 0.0.
-            radius: (options.radius + 0.0).into(),
-            solid: options.solid.into(),
-            ..ObjectRecord::new_zeroed()
-        };
+        (record.first_page, record.pages) = ((self.pages as u32).into(), (page_count as u32).into());
+        match topology {
+            Some(topology) => self.topology.add(topology, &self.shared.spill)?,
+            None if self.shared.has_topology => self.topology.add_cloud(),
+            None => {}
+        }
         self.reason.get_or_insert(reason);
+        self.pages += page_count;
+        self.kept += record.triangles.get();
         self.vertices += vertices;
         self.children += children;
         self.treelets += treelets;
-        self.contents.objects.push(pages);
-        self.contents.records.push((name, record));
+        self.objects.push(pages);
+        self.records.push((name, record));
         Ok(())
     }
 
@@ -244,23 +203,26 @@ impl<'a> Baker<'a> {
         target: &mut Output,
         begin: &mut dyn FnMut(Stage),
     ) -> Result<BakeReport, BakeError> {
-        let progress = &self.resources.progress;
-        let Contents { instances, topology, records, .. } = &self.contents;
+        let Shared { options, resources, spill, .. } = self.shared;
+        let (instances, topology, records, objects, duplicates) =
+            (self.instances, self.topology, self.records, self.objects, self.duplicates);
+        let progress = &resources.progress;
         let mut solids =
             instances.iter().filter(|instance| instance.solid).map(|instance| instance.object as usize);
         if let Some(open) = solids.find(|&object| !topology.is_closed(object)) {
             return Err(BakeError::NotClosed { object: excerpt(records[open].0.as_bytes()) });
         }
         begin(Stage::Encode);
-        let instances = self.contents.instances.len() as u64;
-        assemble(self.contents, self.options.ids, provenance, target, progress)?;
+        let instance_count = instances.len() as u64;
+        let contents = Contents { records, objects, instances, duplicates, topology, spill };
+        assemble(contents, options.ids, provenance, target, progress)?;
         progress.reach(Step::Bake(Stage::Encode), self.kept);
         begin(Stage::Prove);
         let (layout, inflation) = prove(&target.source(), progress)?;
         let topology = layout.read_topology(&target.source())?;
         progress.reach(Step::Bake(Stage::Prove), self.kept);
         Ok(BakeReport {
-            file: FileSummary::new(&layout, target.length(), instances, &topology),
+            file: FileSummary::new(&layout, target.length(), instance_count, &topology),
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
             vertices: self.vertices,
@@ -271,21 +233,4 @@ impl<'a> Baker<'a> {
             seconds: 0.0,
         })
     }
-}
-
-/// Returns the diagonal of a box, in mesh units.
-fn diagonal(bounds: &Aabb) -> f64 {
-    (0..3).map(|a| (f64::from(bounds.hi(a)) - f64::from(bounds.lo(a))).powi(2)).sum::<f64>().sqrt()
-}
-
-/// Returns the power of two that is the unit of f16 residuals. The largest slab of the object stays below half of f16's
-/// range.
-fn f16_exponent(bounds: &Aabb) -> i32 {
-    let widest = (0..3).map(|a| f64::from(bounds.hi(a)) - f64::from(bounds.lo(a))).sum::<f64>();
-    if widest == 0.0 {
-        return 0;
-    }
-    // The next power of two is taken from the bits, because a logarithm may differ between platforms.
-    let exponent = ((widest.to_bits() - 1) >> 52) as i32 - 1022;
-    (exponent - 14).clamp(*F16_EXPONENTS.start(), *F16_EXPONENTS.end())
 }

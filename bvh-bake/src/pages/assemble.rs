@@ -37,13 +37,6 @@ pub(crate) struct Contents {
     pub(crate) spill: Spill,
 }
 
-impl Contents {
-    /// The number of pages of all objects so far.
-    pub(crate) fn page_count(&self) -> usize {
-        self.objects.iter().map(ObjectPages::page_count).sum()
-    }
-}
-
 /// Writes the sections page by page, and then the header.
 pub(crate) fn assemble(
     contents: Contents,
@@ -194,13 +187,18 @@ impl Sections<'_> {
         }
         let content = kind.is_content().then_some(&mut self.content);
         let (output, tally) = (&mut *self.output, &self.tally);
-        let mut section = OpenSection { output, checksum: Hasher::default(), content, tally };
+        let waiting = Vec::new();
+        let mut section = OpenSection { output, checksum: Hasher::default(), content, tally, waiting };
         write(&mut section)?;
+        section.flush()?;
         let checksum = section.checksum.finish();
         self.table.push(Section { kind, range: start..start + length, checksum });
         Ok(())
     }
 }
+
+/// The least number of bytes that are written and hashed at once, because each time waits for other threads.
+const MIN_WRITE_BYTES: usize = 1 << 18;
 
 /// The section that is being written.
 struct OpenSection<'a> {
@@ -208,13 +206,25 @@ struct OpenSection<'a> {
     checksum: Hasher,
     content: Option<&'a mut ContentHasher>,
     tally: &'a Tally<'a>,
+    /// Bytes that are too few to be written yet.
+    waiting: Vec<u8>,
 }
 
 impl OpenSection<'_> {
     fn write(&mut self, bytes: Vec<u8>) -> Result<(), BakeError> {
-        let Self { output, checksum, content, tally } = self;
-        tally.add(bytes.len() as u64);
-        let bytes = Arc::new(bytes);
+        if self.waiting.is_empty() && bytes.len() >= MIN_WRITE_BYTES {
+            self.waiting = bytes;
+        } else {
+            self.waiting.extend_from_slice(&bytes);
+        }
+        if self.waiting.len() >= MIN_WRITE_BYTES { self.flush() } else { Ok(()) }
+    }
+
+    /// Writes the bytes that wait.
+    fn flush(&mut self) -> Result<(), BakeError> {
+        let Self { output, checksum, content, tally, waiting } = self;
+        tally.add(waiting.len() as u64);
+        let bytes = Arc::new(std::mem::take(waiting));
         let hash_content = || {
             if let Some(content) = content {
                 content.update(&bytes);

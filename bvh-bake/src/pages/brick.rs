@@ -8,7 +8,7 @@ use crate::pages::plan::{self, Place};
 use crate::pages::unnumbered::{ObjectPages, UnnumberedPages};
 use crate::storage::Spill;
 use crate::storage::resources::Resources;
-use crate::topology::{self, BrickTopology, Rest, Survey, TopologyLists};
+use crate::topology::{self, BrickTopology, ObjectTopology, Rest, Survey};
 use crate::tree::arena::Arena;
 use crate::tree::treelets::{cut_brick, cut_top};
 use crate::tree::turning;
@@ -44,20 +44,21 @@ pub(crate) struct EncodedObject {
     pub(crate) treelets: u64,
     /// The number of children of all treelets.
     pub(crate) children: u64,
+    /// The topology, if there was a survey of it.
+    pub(crate) topology: Option<ObjectTopology>,
 }
 
-/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. If there is a survey of
-/// the topology of the object, it is added to `lists`.
+/// Builds the trees of an object, cuts them into treelets, plans the pages and encodes them. `spill` stores what is kept
+/// to the end of the bake.
 pub(crate) fn encode_object(
     bricks: Bricks,
     style: Style,
     survey: Option<Survey>,
-    lists: &mut TopologyLists,
     resources: &Resources,
+    spill: &Spill,
 ) -> Result<EncodedObject, BakeError> {
-    let spill = resources.scratch.spill();
     let (bricks, top) = bricks.build(resources, |number, tree, triangles| {
-        encode_brick(number, tree, triangles, style, survey.as_ref(), &spill)
+        encode_brick(number, tree, triangles, style, survey.as_ref(), spill)
     })?;
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
     let mut top = if top.is_leaf() {
@@ -105,6 +106,7 @@ pub(crate) fn encode_object(
     }
     let encoder = Encoder { arena: &top, pages: &pages, places: &places, triangles: &triangles, style };
     let encoded = encoder.encode();
+    let mut topology = None;
     if let Some(survey) = survey {
         let mut places = vec![0; triangles.len()];
         encoder.triangle_places().iter().for_each(|&(number, place)| places[number as usize] = place);
@@ -113,12 +115,12 @@ pub(crate) fn encode_object(
         let first_places =
             first_places.iter().map(|packet| ((encoded.packets + packet) * PACKET as u64) as u32);
         let first_places: Vec<u32> = first_places.collect();
-        topology::join(survey, topologies, &first_places, &rest, lists, resources, &spill)?;
+        topology = Some(topology::join(survey, topologies, &first_places, &rest, resources, spill)?);
     }
     let (packets, treelets) = (packets + encoded.packets, treelets + encoded.treelets);
-    parts.insert(0, UnnumberedPages::new(encoded, &spill)?);
+    parts.insert(0, UnnumberedPages::new(encoded, spill)?);
     let pages = ObjectPages { profile: style.profile, parts, parents };
-    Ok(EncodedObject { pages, packets, treelets, children })
+    Ok(EncodedObject { pages, packets, treelets, children, topology })
 }
 
 fn encode_brick(

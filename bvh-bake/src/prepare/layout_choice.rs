@@ -16,6 +16,7 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_format::realign::upper_form;
 use bvh_format::slabs::{Group, NodeSlabs};
+use std::collections::HashMap;
 
 /// A layout, and the reason for choosing it.
 pub(crate) struct Choice {
@@ -59,28 +60,55 @@ pub(crate) fn width(options: &Options) -> usize {
     options.profile.map_or(WIDTH, Profile::width)
 }
 
-/// A trial: two nodes, by their triangles, and the placement of one beside the other.
+/// A node of trials.
+struct Node {
+    /// The corners of its triangles, relative to the middle of its box, in units of its largest extent.
+    points: Vec<[f64; 3]>,
+    /// The distance from the middle to the farthest corner.
+    radius: f64,
+    kdop: Kdop,
+}
+
+impl Node {
+    fn new(triangles: &[Corners]) -> Self {
+        let points = centred(triangles);
+        let radius = points.iter().map(|p| dot(*p, *p)).fold(0.0, f64::max).sqrt();
+        let kdop = Kdop::of_points(points.iter().map(|point| point.map(|v| v as f32)));
+        Self { points, radius, kdop }
+    }
+}
+
+/// A trial: two nodes, by number, and the placement of one beside the other.
 struct Trial {
-    nodes: [Vec<Corners>; 2],
+    nodes: [usize; 2],
     rotation: [[f64; 3]; 3],
     away: [f64; 3],
     gap: f64,
 }
 
-/// Makes the trials of a tree.
-fn trials(tree: &Tree<PacketTriangles>, triangles: &[Triangle]) -> Vec<Trial> {
+/// Makes the trials of a tree, and their nodes. A small tree has few nodes, which many trials share.
+fn trials(tree: &Tree<PacketTriangles>, triangles: &[Triangle]) -> (Vec<Node>, Vec<Trial>) {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let node = |random: &mut Random, least: usize| {
-        let place = random.below(tree.node_count() as u64) as u32;
-        let numbers = tree.triangles_around(place, least, MAX_EXCESS * least);
-        numbers.into_iter().map(|number| triangles[number as usize].corners).collect()
+    let (mut places, mut number_of) = (Vec::new(), HashMap::new());
+    let mut node = |random: &mut Random, least: usize| {
+        let place = (random.below(tree.node_count() as u64) as u32, least);
+        *number_of.entry(place).or_insert_with(|| {
+            places.push(place);
+            places.len() - 1
+        })
     };
     let mut trial = |number: usize| {
         let least = TRIAL_SIZES[number % 3];
         let nodes = [(); 2].map(|()| node(&mut random, least));
         Trial { nodes, rotation: random.rotation(), away: random.direction(), gap: random.unit() }
     };
-    (0..TRIAL_COUNT).map(&mut trial).collect()
+    let trials = (0..TRIAL_COUNT).map(&mut trial).collect();
+    let node = |&(place, least): &(u32, usize)| {
+        let numbers = tree.triangles_around(place, least, MAX_EXCESS * least);
+        let corners: Vec<_> = numbers.into_iter().map(|number| triangles[number as usize].corners).collect();
+        Node::new(&corners)
+    };
+    (places.par_iter().map(node).collect(), trials)
 }
 
 /// Chooses what the options leave open for a cloud of points, without trials.
@@ -134,7 +162,7 @@ pub(crate) fn choose(
     Choice { profile, encoding, reason: reasons.join("; ") }
 }
 
-fn cheapest(trials: &[Trial], candidates: &[(Profile, f64)]) -> (Profile, String) {
+fn cheapest(trials: &(Vec<Node>, Vec<Trial>), candidates: &[(Profile, f64)]) -> (Profile, String) {
     let rates = overlap_rates(trials);
     let cost = |(profile, nanoseconds): &(Profile, f64)| {
         let widened = if *profile == Profile::Dop26U4 { U4_TESTS } else { 1.0 };
@@ -151,11 +179,8 @@ fn cheapest(trials: &[Trial], candidates: &[(Profile, f64)]) -> (Profile, String
 }
 
 /// Returns how often nodes that are apart overlap, for each direction set.
-fn overlap_rates(trials: &[Trial]) -> [f64; 3] {
-    let overlaps = |trial: &Trial| {
-        let [points_a, points_b] = trial.nodes.each_ref().map(|corners| centred(corners));
-        trial_overlaps(&points_a, &points_b, &trial.rotation, trial.away, trial.gap)
-    };
+fn overlap_rates((nodes, trials): &(Vec<Node>, Vec<Trial>)) -> [f64; 3] {
+    let overlaps = |trial: &Trial| trial_overlaps(trial.nodes.map(|node| &nodes[node]), trial);
     let found: Vec<[bool; 3]> = trials.par_iter().map(overlaps).collect();
     // One overlap is added to each count, so that no set seems free.
     [0, 1, 2].map(|set| (1 + found.iter().filter(|found| found[set]).count()) as f64 / TRIAL_COUNT as f64)
@@ -163,23 +188,18 @@ fn overlap_rates(trials: &[Trial]) -> [f64; 3] {
 
 /// Returns, for each set, whether the k-DOPs overlap if B is placed beside A so that their extents along `away` leave a
 /// gap of `gap` times the radius of the smaller node.
-fn trial_overlaps(
-    points_a: &[[f64; 3]],
-    points_b: &[[f64; 3]],
-    rotation: &[[f64; 3]; 3],
-    away: [f64; 3],
-    gap: f64,
-) -> [bool; 3] {
+fn trial_overlaps([a, b]: [&Node; 2], trial: &Trial) -> [bool; 3] {
+    let Trial { rotation, away, gap, .. } = *trial;
     let rotate = |p: &[f64; 3]| rotation.map(|row| dot(row, *p));
-    let reach = |points: &[[f64; 3]], d: [f64; 3]| points.iter().map(|p| dot(*p, d)).fold(f64::MIN, f64::max);
-    let turned: Vec<[f64; 3]> = points_b.iter().map(rotate).collect();
-    let radius = |points: &[[f64; 3]]| points.iter().map(|p| dot(*p, *p)).fold(0.0, f64::max).sqrt();
-    let space = gap * radius(points_a).min(radius(points_b));
-    let distance = reach(points_a, away) + reach(&turned, away.map(|v| -v)) + space;
+    let reach = |points: &mut dyn Iterator<Item = [f64; 3]>, d: [f64; 3]| {
+        points.map(|p| dot(p, d)).fold(f64::MIN, f64::max)
+    };
+    let space = gap * a.radius.min(b.radius);
+    let reach_b = reach(&mut b.points.iter().map(rotate), away.map(|v| -v));
+    let distance = reach(&mut a.points.iter().copied(), away) + reach_b + space;
     let offset = away.map(|v| v * distance);
-    let (kdop_a, kdop_b) = (kdop_of(points_a), kdop_of(points_b));
     [DirectionSet::Dop6, DirectionSet::Dop14, DirectionSet::Dop26].map(|set| {
-        let group = Group::of_one(&NodeSlabs::from_kdop(&kdop_b, set.slabs()));
+        let group = Group::of_one(&NodeSlabs::from_kdop(&b.kdop, set.slabs()));
         (0..set.slabs()).all(|slab| {
             let direction = DIRECTIONS[slab].map(f64::from);
             let seen = [0, 1, 2].map(|i| (0..3).map(|j| rotation[j][i] * direction[j]).sum());
@@ -191,17 +211,13 @@ fn trial_overlaps(
                 term(0) + term(1) + term(2) + dot(direction, offset)
             };
             let (lo, hi) = (end(form.mirrored().rows), end(form.rows));
-            lo <= f64::from(kdop_a.hi[slab]) && hi >= f64::from(kdop_a.lo[slab])
+            lo <= f64::from(a.kdop.hi[slab]) && hi >= f64::from(a.kdop.lo[slab])
         })
     })
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn kdop_of(points: &[[f64; 3]]) -> Kdop {
-    Kdop::of_points(points.iter().map(|point| point.map(|v| v as f32)))
 }
 
 /// Returns the corners of a node relative to the middle of its box, in units of its largest extent.

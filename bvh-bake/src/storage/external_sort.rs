@@ -47,6 +47,13 @@ impl<T: Pod + Ord + Send + Sync> Sorter<T> {
         Ok(())
     }
 
+    /// Adds the records of another sorter.
+    pub(crate) fn append(&mut self, other: Self, spill: &Spill) -> Result<(), BakeError> {
+        self.count += other.count - other.open.len() as u64;
+        self.runs.extend(other.runs);
+        self.extend(&other.open, spill)
+    }
+
     /// Returns all records in no order, or `None` if some are in files.
     pub(crate) fn in_memory(&mut self) -> Option<&mut Vec<T>> {
         self.runs.is_empty().then_some(&mut self.open)

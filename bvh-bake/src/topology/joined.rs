@@ -28,6 +28,21 @@ impl TopologyLists {
         Self { records: Vec::new(), components: Stream::of_pieces(ENTRIES_PER_PIECE), nets }
     }
 
+    /// Adds an object after all others.
+    pub(crate) fn add(&mut self, object: ObjectTopology, spill: &Spill) -> Result<(), BakeError> {
+        let ObjectTopology { closed, components, nets } = object;
+        let net_count = nets.count();
+        nets.visit(|net| self.nets.append(spill, &[*net]))?;
+        self.components.append(spill, &components)?;
+        self.records.push(TopologyRecord {
+            closed: u32::from(closed).into(),
+            components: (components.len() as u32).into(),
+            nets: (net_count as u32).into(),
+            reserved: 0.into(),
+        });
+        Ok(())
+    }
+
     /// Adds an object of more points than are listed: it has no boundary, and each point is a component.
     pub(crate) fn add_cloud(&mut self) {
         self.records.push(TopologyRecord { closed: 1.into(), ..TopologyRecord::new_zeroed() });
@@ -45,6 +60,15 @@ impl TopologyLists {
     }
 }
 
+/// The topology of an object.
+pub(crate) struct ObjectTopology {
+    pub(crate) closed: bool,
+    /// The least place of each component that is listed, ascending.
+    components: Vec<u32>,
+    /// Pairs of a place and a net.
+    nets: Sorter<[u32; 2]>,
+}
+
 /// Triangles in the pages above the bricks.
 pub(crate) struct Rest<'a> {
     /// The rests of all bricks, brick after brick.
@@ -53,17 +77,15 @@ pub(crate) struct Rest<'a> {
     pub(crate) places: &'a [u32],
 }
 
-/// Joins the bricks of an object and adds its topology to the lists. `first_places` are the places of the first packets
-/// of the bricks.
+/// Joins the bricks of an object. `first_places` are the places of the first packets of the bricks.
 pub(crate) fn join(
     survey: Survey,
     bricks: Vec<BrickTopology>,
     first_places: &[u32],
     rest: &Rest,
-    lists: &mut TopologyLists,
     resources: &Resources,
     spill: &Spill,
-) -> Result<(), BakeError> {
+) -> Result<ObjectTopology, BakeError> {
     let open = bricks.iter().any(|brick| brick.open);
     let mut parts = survey.lists_components().then(|| Parts::new(&bricks, first_places, rest));
     let has_nets = survey.nets.any();
@@ -101,9 +123,8 @@ pub(crate) fn join(
     })?;
     closed &= last.is_none_or(|(_, count)| count == 0);
     let components = parts.map_or_else(Vec::new, Parts::components);
-    let before = lists.nets.count();
+    let mut nets = Sorter::of_runs(run::<[u32; 2]>(resources));
     if closed && has_nets {
-        let mut nets = Sorter::of_runs(run::<[u32; 2]>(resources));
         let (of_ids, netted) = (of_ids.finish(), netted.finish());
         let (mut of_ids, mut netted) = (of_ids.merge(), netted.merge());
         while let Some([id, net]) = of_ids.next()? {
@@ -115,16 +136,8 @@ pub(crate) fn join(
                 }
             }
         }
-        nets.visit(|net| lists.nets.append(spill, &[*net]))?;
     }
-    lists.components.append(spill, &components)?;
-    lists.records.push(TopologyRecord {
-        closed: u32::from(closed).into(),
-        components: (components.len() as u32).into(),
-        nets: ((lists.nets.count() - before) as u32).into(),
-        reserved: 0.into(),
-    });
-    Ok(())
+    Ok(ObjectTopology { closed, components, nets })
 }
 
 /// The parts of all bricks of an object, each with the least place of its triangles.

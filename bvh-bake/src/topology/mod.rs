@@ -19,7 +19,7 @@ mod joined;
 mod nets;
 
 pub(crate) use brick::{BrickTopology, Survey};
-pub(crate) use joined::{Rest, TopologyLists, join};
+pub(crate) use joined::{ObjectTopology, Rest, TopologyLists, join};
 pub(crate) use nets::{MAX_NET, Nets};
 
 /// An object has at least this many triangles for each component listed, unless it has at most [`MAX_FEW_PARTS`].

@@ -46,6 +46,35 @@ fn budgets_jobs_and_formats_do_not_show() {
     assert_eq!(names(directory), ["out.cbvh", "sheet.obj", "sheet.ply", "sheet.stl"]);
 }
 
+/// Many objects of one triangle each share the files of a budget, and their work: each object had files of its own, and the time
+/// grew with the square of their number.
+#[test]
+fn many_objects_take_few_files() {
+    let directory = &place();
+    let count = 5000;
+    let object = |number: usize| {
+        let (x, y) = (number % 100, number / 100);
+        format!("o p{number}\nv {x} {y} 0\nv {x}.5 {y} 0\nv {x} {y}.5 0.1\nf -3 -2 -1\n")
+    };
+    directory.write("many.obj", (0..count).map(object).collect::<String>());
+    let bake = |more: &[&str]| {
+        let arguments = [&["bake", "many.obj", "-o", "out.cbvh", "--json", "-q", "--force"], more].concat();
+        let command = "ulimit -n 64 && exec \"$@\"";
+        let ended = run(Command::new("sh")
+            .args(["-c", command, "sh", env!("CARGO_BIN_EXE_cbvh")])
+            .args(arguments)
+            .current_dir(directory));
+        ended.done().json()
+    };
+    for kind in ["--split-objects", "--scene"] {
+        let whole = bake(&[kind]);
+        assert_eq!((&whole["objects"], &whole["triangles"]), (&count.into(), &count.into()), "{kind}");
+        let within = bake(&[kind, "--max-memory", "48MiB"]);
+        assert!(within["scratch_written_bytes"].as_u64().unwrap() > 10 << 20, "{within}");
+        assert_eq!(within["content_xxh3"], whole["content_xxh3"], "{kind}");
+    }
+}
+
 #[test]
 fn memory_stays_within_the_budget() {
     let directory = &place();
