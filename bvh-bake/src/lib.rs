@@ -30,8 +30,7 @@
 //!
 //! | step | what happens |
 //! |---|---|
-//! | read | one reader per format returns triangles piece by piece; the triangles of a mesh in memory are taken from it
-//! |
+//! | read | one reader per format returns triangles piece by piece; the triangles of a mesh in memory are taken from it |
 //! | prepare | coordinates are placed around an origin, duplicates are found, the layout is chosen |
 //! | build | a tree over bricks of at most 2^18 triangles, built side by side, and the pages of each |
 //! | assemble | pages get their numbers, and the file its sections and checksums |

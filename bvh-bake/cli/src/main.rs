@@ -54,7 +54,7 @@ fn main() -> ExitCode {
 const EXIT_CODES: &str = "\
 Exit codes: 0 done; 1 wrong usage; 2 the system refused (a missing file, a full disk, a missing permission); 3 an input \
 is invalid; 4 a limit was reached; 5 clash --fail-on found one. Each error is one line on standard error. The environment variable CBVH_ISA=scalar, \
-avx2, avx512 or neon selects the instruction set of queries.";
+avx2, avx512, neon or simd128 selects the instruction set of queries.";
 
 /// Exact collision and distance queries between triangle meshes.
 #[derive(Debug, Parser)]

@@ -1,4 +1,6 @@
-//! The questions: collide, contacts, distance, within, motion. Each is a visitor of the same pair walk.
+//! The queries, each in a file or a folder of its own. Queries about two meshes and motions are visitors of the pair walk, but
+//! `self_contacts` walks trees of packets, and `relation` and `patches` are made of other queries. Queries about points, rays and
+//! segments (`probe`) are visitors of the walk of one tree.
 
 pub(crate) mod answers;
 #[cfg(feature = "parallel")]

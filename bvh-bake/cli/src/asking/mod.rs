@@ -187,10 +187,10 @@ pub(crate) fn distance_json(of: &Distance) -> Record {
 /// The options of a run of questions. A frame of a scene is one question.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// The instruction set: auto, scalar, avx2, avx512 or neon. auto is the fastest one of this CPU, unless CBVH_ISA names one
+    /// The instruction set: auto, scalar, avx2, avx512, neon or simd128. auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
     pub(crate) isa: String,
-    /// The number of threads that share the questions, or the pairs of a scene
+    /// The number of threads: they share the questions of a file, or the pairs of each frame of a scene
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true)]
     pub(crate) jobs: u16,
     #[command(flatten)]

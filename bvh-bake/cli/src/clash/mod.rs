@@ -120,7 +120,7 @@ pub(crate) struct ClashArguments {
     /// Print one JSON object with all clashes
     #[arg(long)]
     json: bool,
-    /// The instruction set: auto, scalar, avx2, avx512 or neon. auto is the fastest one of this CPU, unless CBVH_ISA names one
+    /// The instruction set: auto, scalar, avx2, avx512, neon or simd128. auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
     isa: String,
     /// The number of threads [default: one per core]

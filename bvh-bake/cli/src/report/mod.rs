@@ -83,7 +83,7 @@ pub(crate) struct ReportArguments {
     /// Rounds in which all layouts, or all ways to ask, take turns
     #[arg(long, value_name = "N", default_value = "7", value_parser = clap::value_parser!(u16).range(1..=1000))]
     rounds: u16,
-    /// Backend: auto, scalar, avx2, avx512 or neon; auto is the fastest one of this CPU, unless CBVH_ISA names one
+    /// Backend: auto, scalar, avx2, avx512, neon or simd128; auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
     isa: String,
     /// Ask only about ten poses or motions in two rounds: good for trying the command, too few to quote

@@ -86,8 +86,9 @@ impl PartialEq for Cell {
 
 impl Eq for Cell {}
 
-/// The search ends when no sum can exceed the one found by more than this part.
+/// The most steps by which a centre climbs to a greater sum.
 pub(super) const ASCENT_STEPS: u32 = 10;
+/// The search ends when no sum can exceed the one found by more than this part.
 const PRECISION: f64 = 1.0 / 64.0;
 
 impl Querier {
