@@ -187,6 +187,11 @@ pub(crate) fn tell_line(line: &str) {
     let _ = writeln!(io::stderr().lock(), "cbvh: {}", shown(line));
 }
 
+/// Writes a warning to standard error.
+pub(crate) fn tell_warning(warning: &str) {
+    tell_line(&format!("warning: {warning}"));
+}
+
 /// Writes a JSON object and a line feed to standard error. A failure to do so has nowhere to be told.
 pub(crate) fn tell_json(value: &impl Serialize) {
     if let Ok(line) = serde_json::to_string(value) {

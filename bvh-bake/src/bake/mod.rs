@@ -80,7 +80,7 @@ fn bake(
 ) -> Result<BakeReport, BakeError> {
     let resources = gatherer.resources();
     let (triangles, id_end) = (gatherer.triangles(), gatherer.id_end());
-    let instances = gatherer.take_instances();
+    let (instances, warnings) = (gatherer.take_instances(), gatherer.take_warnings());
     if !(0.0..=MAX_RADIUS).contains(&options.radius) {
         return Err(BakeError::Radius(options.radius));
     }
@@ -91,7 +91,7 @@ fn bake(
     while gathered.peek().is_some() {
         baker.add(next_batch(&mut gathered), begin)?;
     }
-    baker.finish(provenance, output, begin)
+    Ok(BakeReport { warnings, ..baker.finish(provenance, output, begin)? })
 }
 
 /// Collects the objects that are baked.
@@ -225,6 +225,7 @@ impl<'a> Baker<'a> {
             file: FileSummary::new(&layout, target.length(), instance_count, &topology),
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
+            warnings: Vec::new(),
             vertices: self.vertices,
             width_inflation: inflation.mean_width(),
             volume_inflation: inflation.mean_volume(),

@@ -17,6 +17,9 @@ pub struct BakeReport {
     /// The largest error that is not coarse for an object of this size and number of triangles, in mesh units. `None`
     /// unless `Options::max_error` exceeds it, so that quantisation may have collapsed triangles that matter.
     pub advised_max_error: Option<f64>,
+    /// What the readers did that the authors of the inputs may not expect, such as bytes or points that they left out. Each is one
+    /// line that names the file and the place. None of them are known if the output was up to date.
+    pub warnings: Vec<String>,
     /// The number of distinct vertices that the input's triangles use.
     pub vertices: u64,
     /// The mean of decoded width over tight width, over all nodes and slabs.

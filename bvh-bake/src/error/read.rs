@@ -190,7 +190,7 @@ pub(crate) fn excerpt(text: &[u8]) -> String {
 }
 
 /// Quotes a whole path without its control characters.
-fn quoted(path: &Path) -> String {
+pub(crate) fn quoted(path: &Path) -> String {
     path.to_string_lossy()
         .chars()
         .flat_map(|c| if c.is_control() { c.escape_debug().collect() } else { vec![c] })

@@ -52,5 +52,5 @@ pub(super) fn mesh_of_faces(faces: &IndexedFaces, names: &Names) -> Result<Mesh,
         }
         Ok::<_, Halt>(())
     })?;
-    Ok(Mesh { objects, instances: Vec::new() })
+    Ok(Mesh { objects, ..Mesh::default() })
 }

@@ -5,6 +5,7 @@ use super::MeshFormat;
 use super::byte_reader::ByteReader;
 #[cfg(not(target_family = "wasm"))]
 use super::read_ahead::ReadAhead;
+use super::warnings::Warnings;
 use crate::error::{Halt, ReadError};
 use crate::progress::{Progress, Step, Tally};
 use crate::storage::read_exact_at;
@@ -35,6 +36,7 @@ pub(crate) struct InputFile<'a> {
     allows_outside: bool,
     /// The bytes if they are in memory. The bytes of a pipe always are, because a pipe can be read only once.
     bytes: Option<Cow<'a, [u8]>>,
+    warnings: Warnings,
 }
 
 impl<'a> InputFile<'a> {
@@ -42,7 +44,12 @@ impl<'a> InputFile<'a> {
     pub(crate) fn of_bytes(bytes: &'a [u8], format: MeshFormat, path: &'a Path) -> Self {
         let length = bytes.len() as u64;
         let bytes = Some(Cow::Borrowed(bytes));
-        Self { path: Cow::Borrowed(path), format, length, as_scene: false, allows_outside: false, bytes }
+        Self::new(path, format, length, bytes)
+    }
+
+    fn new(path: &'a Path, format: MeshFormat, length: u64, bytes: Option<Cow<'a, [u8]>>) -> Self {
+        let (path, warnings) = (Cow::Borrowed(path), Warnings::default());
+        Self { path, format, length, as_scene: false, allows_outside: false, bytes, warnings }
     }
 
     /// Sets whether the nodes of a glTF file become instances.
@@ -82,7 +89,12 @@ impl<'a> InputFile<'a> {
         };
         let format = format.ok_or_else(|| super::unknown_format(path))?;
         let bytes = bytes.map(Cow::Owned);
-        Ok(Self { path: Cow::Borrowed(path), format, length, as_scene: false, allows_outside: false, bytes })
+        Ok(Self::new(path, format, length, bytes))
+    }
+
+    /// Returns where its reader puts warnings.
+    pub(crate) fn warnings(&self) -> &Warnings {
+        &self.warnings
     }
 
     pub(crate) fn path(&self) -> &Path {

@@ -23,6 +23,9 @@ pub struct Mesh {
     /// The poses of objects in the world. With instances, each object has its own frame and gets its own tree, and the
     /// file is a scene. Without instances, there is no world.
     pub instances: Vec<Instance>,
+    /// What the reader of a file did that the file's author may not expect, such as bytes that it left out: one line each, for
+    /// people. A bake puts them into its report.
+    pub warnings: Vec<String>,
 }
 
 /// A named set of triangles.
@@ -45,7 +48,7 @@ impl Mesh {
     pub fn from_triangles(positions: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Mesh {
         let triangle_ids = (0..triangles.len()).into_par_iter().map(|id| id as u32).collect();
         let object = Object { name: String::new(), positions, triangles, triangle_ids };
-        let mut mesh = Mesh { objects: vec![object], instances: Vec::new() };
+        let mut mesh = Mesh { objects: vec![object], ..Mesh::default() };
         mesh.drop_negative_zeros();
         mesh
     }
@@ -133,7 +136,7 @@ impl Mesh {
             pairs.par_sort_by_key(|&(id, _)| id);
             (whole.triangle_ids, whole.triangles) = pairs.into_iter().unzip();
         }
-        Mesh { objects: vec![whole], instances: Vec::new() }
+        Mesh { objects: vec![whole], instances: Vec::new(), warnings: self.warnings }
     }
 }
 

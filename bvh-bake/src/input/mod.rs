@@ -26,6 +26,7 @@ pub(crate) mod polygon;
 mod read_ahead;
 mod stl;
 mod text;
+mod warnings;
 mod xyz;
 
 use crate::error::BakeError;
@@ -177,7 +178,7 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
             let resources = Resources::unlimited(progress);
             let mut faces = IndexedFaces::new(&resources);
             match input.format() {
-                MeshFormat::Stl => stl::read_mesh(open(true)?),
+                MeshFormat::Stl => stl::read_mesh(open(true)?, input.warnings()),
                 MeshFormat::Ply => {
                     ply::read(open, &mut faces)?;
                     mesh_of_faces(&faces, &Names::unnamed())
@@ -206,6 +207,7 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
         mesh.place_all();
         mesh::tell_apart(&mut mesh.instances);
     }
+    mesh.warnings = input.warnings().take(input.path());
     mesh.drop_negative_zeros();
     mesh.check().map_err(|error| ReadError::Mesh { path: input.path().to_owned(), source: error })?;
     Ok(mesh)
@@ -246,6 +248,7 @@ fn append(joined: &mut Mesh, mut mesh: Mesh) -> Result<(), BakeError> {
     mesh.instances.iter_mut().for_each(|instance| instance.object = instance.object.saturating_add(objects));
     joined.instances.append(&mut mesh.instances);
     joined.objects.append(&mut mesh.objects);
+    joined.warnings.append(&mut mesh.warnings);
     Ok(())
 }
 

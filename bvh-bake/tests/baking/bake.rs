@@ -440,7 +440,7 @@ fn objects_are_merged_unless_split_and_keep_names_and_ids() {
     let expected = [("", 40), ("second", 60), ("", 30)].map(|(name, count)| (name.to_owned(), count));
     assert_eq!((names(&split), report.file.objects), (expected.to_vec(), 3));
     assert_eq!(stored(&split).iter().map(|&(id, _)| id).collect::<Vec<_>>(), (0..130).collect::<Vec<_>>());
-    let empty = Mesh { objects: vec![input.objects[3].clone()], instances: Vec::new() };
+    let empty = Mesh { objects: vec![input.objects[3].clone()], ..Mesh::default() };
     assert!(to_bytes(&empty, &Options::default()).is_err());
 }
 

@@ -93,7 +93,7 @@ fn topology() -> Vec<u8> {
         object.name = (*name).to_owned();
         object.triangle_ids = (100 * number..).take(object.triangles.len()).collect();
     }
-    let mesh = Mesh { objects: objects.map(|(_, object)| object).to_vec(), instances: Vec::new() };
+    let mesh = Mesh { objects: objects.map(|(_, object)| object).to_vec(), ..Mesh::default() };
     let options = Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::Packed);
     to_bytes(&mesh, &options.split_objects(true)).unwrap().0
 }

@@ -298,7 +298,7 @@ fn each_object_of_a_file_is_stated() {
     let open = object("open", &sphere[2..], 0);
     let closed = object("closed", &sphere, 1000);
     let doubled = object("doubled", &[sphere.clone(), sphere.clone()].concat(), 2000);
-    let mesh = Mesh { objects: vec![open, closed, doubled], instances: Vec::new() };
+    let mesh = Mesh { objects: vec![open, closed, doubled], ..Mesh::default() };
     let bytes = bake(&mesh, &Options::default().split_objects(true));
     let found = [0, 1, 2].map(|number| {
         let Stated { closed, components, nets, .. } = stated(&bytes, number);

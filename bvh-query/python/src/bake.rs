@@ -74,7 +74,7 @@ pub(crate) fn bake(
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
 }
 
-/// Bakes mesh files into a file. Returns whether it was up to date already.
+/// Bakes mesh files into a file. Returns the warnings of their readers.
 #[pyfunction]
 pub(crate) fn bake_files(
     py: Python<'_>,
@@ -83,9 +83,12 @@ pub(crate) fn bake_files(
     options: BakeOptions,
     max_memory: Option<u64>,
     force: bool,
-) -> PyResult<bool> {
+) -> PyResult<Vec<String>> {
     let options = options.read()?;
     let bake = || FileBake::new(inputs, output).options(options).max_memory(max_memory).force(force).run();
     let outcome = detached(py, || on_pool(bake))?.map_err(bake_error)?;
-    Ok(matches!(outcome, Outcome::UpToDate(_)))
+    Ok(match outcome {
+        Outcome::Baked(report) => report.warnings,
+        Outcome::UpToDate(_) => Vec::new(),
+    })
 }

@@ -1,6 +1,6 @@
 //! The meshes of a question. Each is an opened file, or a mesh baked in memory.
 
-use crate::console::{Failure, tell_line};
+use crate::console::{Failure, tell_line, tell_warning};
 use crate::options::LayoutArguments;
 use crate::process::map;
 use bvh_bake::mesh::Mesh;
@@ -193,7 +193,13 @@ fn bake(path: &Path, options: &Options, object: Option<&str>) -> Result<(Bvh, f6
 
 /// Reads a mesh file.
 pub(crate) fn read_mesh(path: &Path) -> Result<Mesh, Failure> {
-    input::read(path).map_err(|error| Failure::from_bake(path.display(), &error.into()))
+    told(input::read(path).map_err(|error| Failure::from_bake(path.display(), &error.into())))
+}
+
+/// Tells the warnings of a mesh that has been read.
+pub(crate) fn told(read: Result<Mesh, Failure>) -> Result<Mesh, Failure> {
+    read.iter().flat_map(|mesh| &mesh.warnings).for_each(|warning| tell_warning(warning));
+    read
 }
 
 /// Bakes the mesh of a file in memory.

@@ -138,12 +138,12 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
     fn note(&self, number: usize, asset: &Asset, baked: Result<Report, BakeError>) -> Result<(), Failure> {
         let Asset { line, named_input: input, named_output: output, .. } = asset;
         let mut done = lock(&self.done);
-        let (record, told) = match baked {
+        let (record, told): (_, Vec<String>) = match baked {
             Ok(mut report) => {
                 (report.input, report.output) = (input.clone(), output.clone());
                 done.summary.add(&report);
                 let record = record! { line: line, exit_code: 0 }.with(report.json());
-                (record, report.warning.map(|warning| format!("warning: {warning}")))
+                (record, report.warnings().into_iter().map(|warning| format!("warning: {warning}")).collect())
             }
             Err(error) => {
                 let failure = Failure::from_bake(asset.input.display(), &error);
@@ -151,12 +151,10 @@ impl<'a, T: Iterator<Item = (usize, &'a Asset)> + Send> Queue<'a, T> {
                 done.summary.add_failed(code);
                 let what =
                     record! { line: line, exit_code: code, input: input, output: output, error: error };
-                (what, Some(error))
+                (what, vec![error])
             }
         };
-        if let Some(line) = told {
-            self.spinner.suspend(|| console::tell_line(&line));
-        }
+        self.spinner.suspend(|| told.iter().for_each(|line| console::tell_line(line)));
         self.spinner.set_message(done.summary.progress());
         match &mut done.journal {
             Some(journal) => journal.add(number, format!("{record}\n")),

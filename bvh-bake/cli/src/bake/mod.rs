@@ -34,12 +34,12 @@ pub(crate) fn run(arguments: &BakeArguments) -> Result<(), Failure> {
     let baked = bake(inputs, output, &options, arguments, max_memory, Some(&screen));
     screen.spinner.finish_and_clear();
     let report = baked.map_err(|error| Failure::from_bake(names(&arguments.inputs), &error))?;
-    match &report.warning {
-        Some(warning) if screen.tells_stages => {
-            console::tell_json(&serde_json::json!({ "warning": warning }))
+    for warning in report.warnings() {
+        if screen.tells_stages {
+            console::tell_json(&serde_json::json!({ "warning": warning }));
+        } else if !arguments.json {
+            console::tell_warning(warning);
         }
-        Some(warning) if !arguments.json => console::tell_line(&format!("warning: {warning}")),
-        _ => {}
     }
     if arguments.json {
         console::json(&report.json())
@@ -138,6 +138,9 @@ occurs again. cbvh scene asks about such a file.
 
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
+
+Warnings on standard error, and in the field warnings of --json, say what a reader did that the author of a file may not \
+expect, such as bytes that it left out.
 
 An XYZ file has a point per line; what follows its three numbers is ignored. Each point becomes a triangle whose corners are \
 equal, and points that coincide all stay. --radius and --solid are kept in the file, and every question respects them.

@@ -18,8 +18,8 @@ pub(crate) struct Report {
     outcome: Outcome,
     stages: Vec<StageLine>,
     pub(crate) seconds: f64,
-    /// What may be wrong with the output, although the bake succeeded.
-    pub(crate) warning: Option<String>,
+    /// Why the output may be coarse, although the bake succeeded.
+    coarseness: Option<String>,
 }
 
 impl Report {
@@ -32,11 +32,17 @@ impl Report {
         seconds: f64,
     ) -> Self {
         let input = names(inputs);
-        let warning = match &outcome {
-            Outcome::Baked(report) => warning(&input, options, report),
+        let coarseness = match &outcome {
+            Outcome::Baked(report) => coarseness(&input, options, report),
             Outcome::UpToDate(_) => None,
         };
-        Self { input, output: output.display().to_string(), outcome, stages, seconds, warning }
+        Self { input, output: output.display().to_string(), outcome, stages, seconds, coarseness }
+    }
+
+    /// Returns what may be wrong with the output, although the bake succeeded, one line each.
+    pub(crate) fn warnings(&self) -> Vec<&str> {
+        let of_readers = self.baked().map_or(&[][..], |baked| &baked.warnings);
+        of_readers.iter().chain(&self.coarseness).map(String::as_str).collect()
     }
 
     /// Returns the facts about the file.
@@ -88,7 +94,8 @@ impl Report {
             mean_children: baked.map(|baked| baked.mean_children),
             bake_seconds: baked.map(|baked| baked.seconds),
             seconds: self.seconds,
-            warning: self.warning,
+            warning: self.coarseness,
+            warnings: self.warnings(),
             stage_seconds: baked.map(|_| stages.collect::<BTreeMap<_, _>>()),
             // Bytes read from all files: the sum of the next three fields.
             bytes_read: traffic.map(|traffic| traffic.read()),
@@ -175,7 +182,7 @@ fn sides(path: &Path) -> Option<[f32; 3]> {
 }
 
 /// Returns a warning if quantisation may have collapsed triangles that matter.
-fn warning(input: &str, options: &Options, report: &BakeReport) -> Option<String> {
+fn coarseness(input: &str, options: &Options, report: &BakeReport) -> Option<String> {
     let (advised, file) = (report.advised_max_error?, &report.file);
     let allowed = options.max_error.unwrap_or(file.max_quantization_error);
     Some(format!(

@@ -2,7 +2,7 @@
 
 use super::ClashArguments;
 use crate::asking::files::{POSE_NUMBERS, each_json_line, files_below, require_regular, stem};
-use crate::asking::mesh::{bake_in_memory, is_baked, read_mesh, triangles_of};
+use crate::asking::mesh::{bake_in_memory, is_baked, read_mesh, told, triangles_of};
 use crate::console::{Failure, names};
 use crate::process;
 use bvh_bake::input::{MeshFormat, read_scene};
@@ -239,8 +239,9 @@ fn read_file(path: &Path, files: &Files, splits: bool) -> Result<Vec<Part>, Fail
         return parts_of(path, &bvh, |number| whole.object(number).unwrap_or_else(|| whole.clone()));
     }
     let mut mesh = if splits || is_gltf(path) {
+        let read = read_scene(path);
         let mut mesh =
-            read_scene(path).map_err(|error| Failure::from_bake(path.display(), &BakeError::from(error)))?;
+            told(read.map_err(|error| Failure::from_bake(path.display(), &BakeError::from(error))))?;
         share_equal_meshes(&mut mesh);
         mesh
     } else {

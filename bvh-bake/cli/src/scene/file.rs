@@ -1,7 +1,7 @@
 //! Reads scene files (meshes and other shapes, instances, moving instances, allowed pairs and margins), and opens baked scenes.
 
 use crate::asking::files::{self, POSE_NUMBERS, require_regular};
-use crate::asking::mesh::{How, LoadedMesh, is_baked, point_out_units, triangles_of};
+use crate::asking::mesh::{How, LoadedMesh, is_baked, point_out_units, told, triangles_of};
 use crate::console::{Failure, word};
 use crate::options::LayoutArguments;
 use crate::process::map;
@@ -236,7 +236,7 @@ fn read_points(path: &Path) -> Result<Mesh, Failure> {
         known.filter(|format| matches!(format, MeshFormat::Ply | MeshFormat::Pcd)).unwrap_or(MeshFormat::Xyz);
     let bytes = std::fs::read(path).map_err(|error| Failure::from_input(path, &error))?;
     let read = read_bytes(&bytes, format, path);
-    read.map_err(|error| Failure::from_bake(path.display(), &BakeError::from(error)))
+    told(read.map_err(|error| Failure::from_bake(path.display(), &BakeError::from(error))))
 }
 
 impl LoadedScene {

@@ -11,6 +11,7 @@ impl Gatherer<'_> {
     /// Adds the objects of a mesh that has been checked. Their ids follow the present ones.
     pub(crate) fn add_mesh(&mut self, mesh: &Mesh) -> Result<(), Halt> {
         let (first, first_id) = (self.names.len(), self.id_end);
+        self.warnings.extend_from_slice(&mesh.warnings);
         for object in &mesh.objects {
             let number = self.object(object.name.clone())?;
             // Objects that are joined lose their names, even if one of them has no triangles.

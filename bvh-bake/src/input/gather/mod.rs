@@ -66,6 +66,8 @@ pub(crate) struct Gatherer<'a> {
     id_end: u64,
     /// The object that each triangle belongs to, if the caller needs it.
     runs: Option<ObjectRuns>,
+    /// The warnings of the readers.
+    warnings: Vec<String>,
 }
 
 /// The triangles of one future tree.
@@ -103,6 +105,7 @@ impl<'a> Gatherer<'a> {
             triangles: 0,
             id_end: 0,
             runs: None,
+            warnings: Vec::new(),
         }
     }
 
@@ -146,6 +149,7 @@ impl<'a> Gatherer<'a> {
             let file = file.ok_or_else(|| input.failed(std::io::ErrorKind::UnexpectedEof.into()))?;
             Checksums { file, mesh: None }
         };
+        self.warnings.append(&mut input.warnings().take(input.path()));
         self.name_after(input, first_object);
         if input.is_scene() {
             self.place_from(first_object);
@@ -160,7 +164,10 @@ impl<'a> Gatherer<'a> {
         let open = |weight| move |is_first| opener.open(if is_first { weight } else { 0 });
         let mut faces = IndexedFaces::new(self.resources);
         let (names, left) = match opener.input.format() {
-            MeshFormat::Stl => return stl::read(opener.open(WHOLE)?, &mut SolidsForBake::new(self)),
+            MeshFormat::Stl => {
+                let (reader, warnings) = (opener.open(WHOLE)?, opener.input.warnings());
+                return stl::read(reader, &mut SolidsForBake::new(self), warnings);
+            }
             MeshFormat::Ply => {
                 ply::read(open(PLY_BYTES), &mut faces)?;
                 (Names::unnamed(), WHOLE - PLY_BYTES)
@@ -199,6 +206,11 @@ impl<'a> Gatherer<'a> {
             let instance = Instance { name: name.clone(), ..Instance::of_object(number as u32) };
             self.instances.push(instance);
         }
+    }
+
+    /// Takes out the warnings of the readers, one line each.
+    pub(crate) fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
     }
 
     /// Takes the instances out. Their objects are numbered among those with triangles, and their names are told apart.

@@ -9,6 +9,7 @@ mod named_files;
 
 use bvh_bake::input::{MeshFormat, Place, ReadError, read, read_bytes};
 use bvh_bake::mesh::{Mesh, Object};
+use cbvh_testkit::Random;
 use gltf::{INDEXED, glb, gltf};
 use std::fs;
 use std::path::Path;
@@ -137,7 +138,8 @@ fn binary_stl_joins_equal_vertices_in_order() {
             let mesh = try_bytes(&bytes, MeshFormat::Stl).unwrap();
             assert_eq!(only(&mesh).triangles, [[0, 1, 2], [1, 0, 3]]);
             assert_eq!(only(&mesh).positions[3], [0.5, 0.5, 7.0]);
-            bytes.extend(b"trailing bytes are ignored");
+            assert_eq!(mesh.warnings.is_empty(), bytes.len() == 184, "{:?}", mesh.warnings);
+            bytes.extend(b"trailing bytes are left out");
         }
     }
     let mut infinite = TWO;
@@ -152,6 +154,42 @@ fn binary_stl_joins_equal_vertices_in_order() {
     ] {
         refused(&bytes, MeshFormat::Stl, expected);
     }
+}
+
+/// Puts a CR before each LF, as a copy in text mode does.
+fn copied_as_text(bytes: &[u8]) -> Vec<u8> {
+    bytes.iter().flat_map(|&byte| if byte == b'\n' { vec![b'\r', byte] } else { vec![byte] }).collect()
+}
+
+#[test]
+fn bytes_after_the_last_triangle_are_told_or_show_that_the_file_is_mangled() {
+    let mut random = Random::new(8);
+    let mut triangles = vec![[[0f32; 3]; 3]; 300];
+    triangles.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|c| *c = random.signed() as f32);
+    let bytes = binary_stl(b"by hand", 300, &triangles);
+    for (rest, said) in [
+        (&b"x"[..], "test: byte 15084: left out 1 more byte after the last triangle"),
+        (b"\r\n", "test: byte 15084: left out 2 more bytes after the last triangle"),
+        (&[0; 50], "test: byte 15084: left out 50 more bytes after the last triangle"),
+    ] {
+        let mesh = try_bytes(&[&bytes, rest].concat(), MeshFormat::Stl).unwrap();
+        assert_eq!((mesh.warnings, mesh.objects[0].triangles.len()), (vec![said.to_owned()], 300));
+    }
+    let line_feeds = bytes.iter().filter(|&&byte| byte == b'\n').count();
+    assert!(line_feeds > 20);
+    let said = refusal(&copied_as_text(&bytes), MeshFormat::Stl);
+    assert!(said.contains("mangled") && said.contains("copy it again as binary"), "{said}");
+    // One LF, so that all numbers keep their sizes, or are far off.
+    for at in [84 + 12, 84 + 50 * 299 + 47] {
+        let mut one: Vec<u8> = bytes.iter().map(|&byte| if byte == b'\n' { 11 } else { byte }).collect();
+        one[at] = b'\n';
+        let said = refusal(&copied_as_text(&one), MeshFormat::Stl);
+        assert!(said.contains("mangled"), "{said}");
+    }
+    // Bytes that were read as Latin-1 and written as UTF-8.
+    let utf_8: String = bytes.iter().map(|&byte| char::from(byte)).collect();
+    let said = refusal(utf_8.as_bytes(), MeshFormat::Stl);
+    assert!(said.contains("mangled"), "{said}");
 }
 
 #[test]

@@ -76,7 +76,7 @@ from ._answers import (
     Separation,
     Side,
 )
-from ._baking import bake, bake_files
+from ._baking import BakeWarning, bake, bake_files
 from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
@@ -89,6 +89,7 @@ from .manager import CollisionManager
 
 __all__ = [
     "BakeError",
+    "BakeWarning",
     "Clash",
     "ClashClass",
     "ClosestPoint",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import os
+import warnings
 from typing import Any, Iterable, Sequence
 
 import numpy as np
@@ -11,6 +12,10 @@ from numpy.typing import ArrayLike
 
 from . import _cbvh
 from ._mesh import Mesh, open
+
+
+class BakeWarning(UserWarning):
+    """The reader of a mesh file did something that the file's author may not expect."""
 
 
 def _options(
@@ -120,8 +125,9 @@ def bake_files(
     If the file is up to date, nothing is done, unless ``force``. ``max_memory``: the most bytes of memory; the rest
     goes to scratch files, so a mesh may be larger than memory. The other options are those of `bake`. The environment
     variable ``RAYON_NUM_THREADS`` sets the number of threads of the module, for bakes and for ``parallel=True``; the
-    default is the number of cores. Raises OSError if the system refuses a file, and BakeError if a mesh cannot be
-    baked.
+    default is the number of cores. Warns with `BakeWarning` of what the readers did that the authors of the files may
+    not expect, such as bytes or points that they left out. Raises OSError if the system refuses a file, and BakeError
+    if a mesh cannot be baked.
     """
     if isinstance(inputs, (str, bytes, os.PathLike)):
         inputs = [inputs]
@@ -139,5 +145,6 @@ def bake_files(
         if max_memory < 0:
             raise ValueError(f"max_memory: expected bytes of at least 0, found {max_memory}")
         max_memory = min(max_memory, 2**64 - 1)
-    _cbvh.bake_files(files, os.fsdecode(output), options, max_memory, _bool(force, "force"))
+    for warning in _cbvh.bake_files(files, os.fsdecode(output), options, max_memory, _bool(force, "force")):
+        warnings.warn(warning, BakeWarning, stacklevel=2)
     return open(output)

@@ -2,18 +2,22 @@
 //!
 //! STL has no vertex numbers, so the reader joins vertices with equal coordinates and numbers them in the order in
 //! which they first appear. A file whose length is exactly what its binary count requires is binary even if it starts
-//! with `solid`, and so is a file with a zero byte near its start. Bytes after the last binary triangle are ignored,
-//! because some exporters write them. A file that is shorter than its count requires, or text that ends inside a solid,
+//! with `solid`, and so is a file with a zero byte near its start. Bytes after the last binary triangle are left out with a
+//! warning, because some exporters write them, unless they tell that the file is mangled (module `leftover`). A file that is shorter than its count requires, or text that ends inside a solid,
 //! is refused. Normals are ignored.
+
+mod leftover;
 
 use super::byte_reader::{ByteReader, Words};
 use super::text::Lines;
+use super::warnings::Warnings;
 use super::{COORDINATE, next_ids, text};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::mesh::{Mesh, Object};
 use crate::limits::{MAX_VERTICES, coordinate_fits};
 use crate::threads::prelude::*;
 use crate::triangles::TRIANGLES_PER_PART;
+use leftover::Leftover;
 use std::collections::HashMap;
 use std::io::Read;
 
@@ -23,6 +27,9 @@ const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 /// The number of bytes that decide between text and binary.
 const TELLING: usize = 1024;
+
+/// The number of bytes after the last triangle that are looked at at a time.
+const REST_BYTES: usize = 1 << 16;
 
 /// The number of triangles that are passed on at a time: several parts of a stream for each thread.
 const BATCH_TRIANGLES: usize = 8 * TRIANGLES_PER_PART;
@@ -42,14 +49,18 @@ pub(super) trait Solids {
 }
 
 /// Reads a file into a mesh in which equal vertices are joined.
-pub(super) fn read_mesh<R: Read>(reader: ByteReader<R>) -> Result<Mesh, Halt> {
+pub(super) fn read_mesh<R: Read>(reader: ByteReader<R>, warnings: &Warnings) -> Result<Mesh, Halt> {
     let mut joined = Joined::default();
-    read(reader, &mut joined)?;
+    read(reader, &mut joined, warnings)?;
     Ok(joined.mesh)
 }
 
 /// Reads a file from its beginning to its end.
-pub(super) fn read<R: Read>(mut reader: ByteReader<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+pub(super) fn read<R: Read>(
+    mut reader: ByteReader<R>,
+    solids: &mut impl Solids,
+    warnings: &Warnings,
+) -> Result<(), Halt> {
     let length = reader.length();
     let head = reader.peek(TELLING);
     if is_ascii(head) && !is_exact_binary(head, length) {
@@ -57,7 +68,7 @@ pub(super) fn read<R: Read>(mut reader: ByteReader<R>, solids: &mut impl Solids)
         let result = read_ascii(&mut words, solids);
         words.reader.finish(result)
     } else {
-        let result = read_binary(&mut reader, solids);
+        let result = read_binary(&mut reader, solids, warnings);
         reader.finish(result)
     }
 }
@@ -80,7 +91,11 @@ fn binary_count(bytes: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(count.try_into().ok()?))
 }
 
-fn read_binary<R: Read>(reader: &mut ByteReader<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+fn read_binary<R: Read>(
+    reader: &mut ByteReader<R>,
+    solids: &mut impl Solids,
+    warnings: &Warnings,
+) -> Result<(), Halt> {
     let Some(count) = binary_count(reader.peek(HEAD)) else {
         let found = format!("{} bytes", reader.length());
         return Err(Fault::new(Place::File, "STL text, or at least 84 bytes of binary STL", found).into());
@@ -90,26 +105,53 @@ fn read_binary<R: Read>(reader: &mut ByteReader<R>, solids: &mut impl Solids) ->
         let expected = format!("a count of at most {room} triangles, which is what fits the file");
         return Err(Fault::new(Place::Byte(HEAD as u64 - 4), expected, count.to_string()).into());
     }
+    let end = HEAD as u64 + u64::from(count) * TRIANGLE as u64;
+    let mut leftover = Some(reader.length() - end).filter(|&left| left > 0).map(Leftover::new);
+    leftover.iter_mut().for_each(|leftover| leftover.look(reader.peek(HEAD)));
     reader.skip(HEAD);
     solids.begin(String::new(), count as usize)?;
     let mut before = 0;
     while before < count as usize {
         let now = (count as usize - before).min(BATCH_TRIANGLES);
-        let triangles = reader.peek(now * TRIANGLE).as_chunks::<TRIANGLE>().0;
+        let bytes = reader.peek(now * TRIANGLE);
+        let triangles = bytes.as_chunks::<TRIANGLE>().0;
         let at = |place: usize| HEAD as u64 + (before + place) as u64 * TRIANGLE as u64;
         let misfit = triangles.par_iter().position_first(|triangle| first_misfit(triangle).is_some());
         if let Some(place) = misfit {
             let (corner, value) = first_misfit(&triangles[place]).unwrap_or_default();
             let byte = at(place) + 12 + 4 * corner as u64;
-            return Err(Fault::new(Place::Byte(byte), COORDINATE, format!("{value:e}")).into());
+            let found = match &leftover {
+                Some(leftover) if leftover.is_ragged() => {
+                    let left = reader.length() - end;
+                    format!(
+                        "{value:e}, and {left} bytes after the last triangle; is the file mangled? copy it again as binary"
+                    )
+                }
+                _ => format!("{value:e}"),
+            };
+            return Err(Fault::new(Place::Byte(byte), COORDINATE, found).into());
         }
         if triangles.len() < now {
             let place = Place::Byte(at(triangles.len()));
             return Err(Fault::new(place, "a triangle", "the end of the file").into());
         }
         solids.triangles(now, |place| coordinates(&triangles[place]).map(|corner| corner.map(f64::from)))?;
+        if let Some(leftover) = &mut leftover {
+            leftover.look(bytes);
+            triangles.iter().for_each(|triangle| leftover.count(&coordinates(triangle)));
+        }
         reader.skip(now * TRIANGLE);
         before += now;
+    }
+    if let Some(mut leftover) = leftover {
+        while let rest = reader.peek(REST_BYTES)
+            && !rest.is_empty()
+        {
+            let length = rest.len();
+            leftover.look(rest);
+            reader.skip(length);
+        }
+        warnings.add(Place::Byte(end), leftover.judge(Place::Byte(end))?);
     }
     solids.end()
 }
