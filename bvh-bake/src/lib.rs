@@ -6,7 +6,7 @@
 //!
 //! # Usage
 //!
-//! [`FileBake`] bakes mesh files (OBJ, STL, PLY, glTF, XYZ, PCD) of any size within a memory budget, [`to_bytes`] bakes a
+//! [`FileBake`] bakes mesh files (OBJ, STL, PLY, glTF, COLLADA, XYZ, PCD) of any size within a memory budget, [`to_bytes`] bakes a
 //! [`Mesh`](mesh::Mesh) in memory, and [`build_rs::bake`] bakes a mesh of the source tree from a build script.
 //! [`Options`] lists the choices; the defaults suit most meshes.
 //!

@@ -56,7 +56,7 @@ pub struct Options {
     /// Whether each object of the input gets a tree of its own. [`crate::FileBake`] names objects without a name after
     /// their files.
     pub split_objects: bool,
-    /// Whether [`crate::FileBake`] reads its inputs as scenes ([`crate::input::read_scene`]): the nodes of glTF files
+    /// Whether [`crate::FileBake`] reads its inputs as scenes ([`crate::input::read_scene`]): the nodes of glTF and COLLADA files
     /// and the objects of other files become instances. Each object then gets its own tree.
     pub scene: bool,
     /// Whether the original triangle numbers are kept.

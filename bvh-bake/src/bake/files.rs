@@ -100,7 +100,7 @@ impl<'a> FileBake<'a> {
     }
 
     /// Sets the most memory that the whole process may have resident, in bytes; `None` for no limit. Data that do not
-    /// fit go to scratch files. Inputs are read piece by piece; only the JSON of glTF files, and files that are not
+    /// fit go to scratch files. Inputs are read piece by piece; only COLLADA files, the JSON of glTF files, and files that are not
     /// regular such as pipes, are read into memory as a whole. If one of these is too large for the budget, the bake
     /// fails. Some allocators, such as that of the GNU C library, keep much of the freed memory and must be told not
     /// to: see its `mallopt`.

@@ -1,11 +1,11 @@
 //! Opens input files, which can be read from the beginning any number of times, and counts their bytes as they are
 //! read.
 
-use super::MeshFormat;
 use super::byte_reader::ByteReader;
 #[cfg(not(target_family = "wasm"))]
 use super::read_ahead::ReadAhead;
 use super::warnings::Warnings;
+use super::{MeshFormat, UpAxis};
 use crate::error::{Halt, ReadError};
 use crate::progress::{Progress, Step, Tally};
 use crate::storage::read_exact_at;
@@ -30,8 +30,9 @@ pub(crate) struct InputFile<'a> {
     path: Cow<'a, Path>,
     format: MeshFormat,
     length: u64,
-    /// Whether the nodes of a glTF file become instances.
+    /// Whether the nodes of a glTF or COLLADA file become instances.
     as_scene: bool,
+    up_axis: UpAxis,
     /// Whether a glTF file may name files outside its folder.
     allows_outside: bool,
     /// The bytes if they are in memory. The bytes of a pipe always are, because a pipe can be read only once.
@@ -48,17 +49,26 @@ impl<'a> InputFile<'a> {
     }
 
     fn new(path: &'a Path, format: MeshFormat, length: u64, bytes: Option<Cow<'a, [u8]>>) -> Self {
-        let (path, warnings) = (Cow::Borrowed(path), Warnings::default());
-        Self { path, format, length, as_scene: false, allows_outside: false, bytes, warnings }
+        let (path, up_axis, warnings) = (Cow::Borrowed(path), UpAxis::default(), Warnings::default());
+        Self { path, format, length, as_scene: false, up_axis, allows_outside: false, bytes, warnings }
     }
 
-    /// Sets whether the nodes of a glTF file become instances.
+    /// Sets whether the nodes of a glTF or COLLADA file become instances.
     pub(crate) fn for_scene(self, as_scene: bool) -> Self {
         Self { as_scene, ..self }
     }
 
     pub(crate) fn is_scene(&self) -> bool {
         self.as_scene
+    }
+
+    /// Sets what to do with the axis that a COLLADA file declares to point up.
+    pub(crate) fn with_up_axis(self, up_axis: UpAxis) -> Self {
+        Self { up_axis, ..self }
+    }
+
+    pub(crate) fn up_axis(&self) -> UpAxis {
+        self.up_axis
     }
 
     /// Sets whether a glTF file may name files outside its folder.

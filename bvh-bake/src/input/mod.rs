@@ -1,17 +1,20 @@
-//! Reads meshes from files: OBJ, STL, PLY and glTF, and clouds of points: XYZ, PCD and PLY.
+//! Reads meshes from files: OBJ, STL, PLY, glTF and COLLADA, and clouds of points: XYZ, PCD and PLY.
 //!
 //! There is one reader per format. It reads a file piece by piece and passes what it finds either to a bake (module
 //! `gather`), which keeps to its memory budget, or into a [`Mesh`] that keeps the contract of [`Mesh::check`]
 //! ([`read`]). If a file is malformed, one line states what is wrong and where. No reader panics, and no reader
-//! allocates from a count that the file declares before checking that the file is long enough for it. Of glTF files,
-//! whose parts may be in any order, the JSON is read as a whole, and buffers block by block.
+//! allocates from a count that the file declares before checking that the file is long enough for it. The parts
+//! of glTF and COLLADA files may be in any order: the JSON of the former, of which buffers are read block by block, and the latter
+//! are read as a whole.
 //!
 //! Polygons are triangulated (module `polygon`), objects without triangles are left out, degenerate triangles are kept,
 //! and -0.0 is read as 0.0.
 
 mod byte_reader;
 mod checksums;
+mod collada;
 mod collect;
+mod frame;
 pub(crate) mod gather;
 pub(crate) mod gltf;
 mod indexed;
@@ -27,6 +30,7 @@ mod read_ahead;
 mod stl;
 mod text;
 mod warnings;
+pub mod xml;
 mod xyz;
 
 use crate::error::BakeError;
@@ -35,7 +39,9 @@ pub use crate::error::{Place, ReadError};
 use crate::progress::{Progress, WHOLE};
 use crate::storage::resources::{Allowance, Resources};
 pub(crate) use checksums::Checksums;
+pub use collada::UpAxis;
 use collect::mesh_of_faces;
+use gather::SceneFaces;
 use indexed::IndexedFaces;
 pub(crate) use input_file::InputFile;
 use input_file::Opener;
@@ -57,6 +63,8 @@ pub enum MeshFormat {
     Ply,
     /// glTF 2.0, as JSON or as one binary file (GLB).
     Gltf,
+    /// COLLADA 1.4 and 1.5, in metres and with z pointing up.
+    Collada,
     /// XYZ, text with a point per line.
     Xyz,
     /// PCD, the points of the Point Cloud Library, as text, binary or compressed.
@@ -64,7 +72,7 @@ pub enum MeshFormat {
 }
 
 const KNOWN: &str =
-    "a mesh in a file named .obj, .stl, .ply, .gltf or .glb, or points in one named .xyz, .pcd or .ply";
+    "a mesh in a file named .obj, .stl, .ply, .gltf, .glb or .dae, or points in one named .xyz, .pcd or .ply";
 
 impl MeshFormat {
     /// Returns the format that the extension of a file's name stands for, in upper or lower case.
@@ -75,6 +83,7 @@ impl MeshFormat {
             "stl" => Some(MeshFormat::Stl),
             "ply" => Some(MeshFormat::Ply),
             "gltf" | "glb" => Some(MeshFormat::Gltf),
+            "dae" => Some(MeshFormat::Collada),
             "xyz" => Some(MeshFormat::Xyz),
             "pcd" => Some(MeshFormat::Pcd),
             _ => None,
@@ -99,6 +108,8 @@ impl MeshFormat {
             Some(MeshFormat::Pcd)
         } else if head.starts_with(b"glTF") || trimmed.starts_with(b"{") {
             Some(MeshFormat::Gltf)
+        } else if collada::is_collada(head) {
+            Some(MeshFormat::Collada)
         } else if stl::is_ascii(bytes) || stl::is_exact_binary(bytes, length) {
             Some(MeshFormat::Stl)
         } else if !head.contains(&0) && text::Lines::new(head).any(is_statement) {
@@ -125,8 +136,16 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
     collect(&find(path)?)
 }
 
-/// Reads a mesh file as a scene, which has instances. In a glTF file, each node with a mesh is an instance. Nodes share
-/// their meshes, and a mesh becomes one object for each scale with which it occurs. In other files, each object is an
+/// Reads a mesh file as [`read`] does, and says what to do with the axis that a COLLADA file declares to point up.
+///
+/// # Errors
+/// The errors of [`read`].
+pub fn read_with(path: &Path, up_axis: UpAxis) -> Result<Mesh, ReadError> {
+    collect(&find(path)?.with_up_axis(up_axis))
+}
+
+/// Reads a mesh file as a scene, which has instances. In a glTF or COLLADA file, each node with a mesh is an instance. Nodes
+/// share their meshes, and a mesh becomes one object for each scale with which it occurs. In other files, each object is an
 /// instance at its own place. Names that occur again get a number.
 ///
 /// The transform of a node may be a matrix. If it is a rotation with scales to within 2^-22, it is treated as one. If a
@@ -166,7 +185,12 @@ fn read_error(halt: Halt, path: &Path) -> ReadError {
 /// Reads an input into a mesh that keeps the contract.
 fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
     let (progress, checksum) = (&Progress::default(), OnceLock::new());
-    let mesh = if input.format() == MeshFormat::Gltf {
+    let mesh = if input.format() == MeshFormat::Collada {
+        let resources = Resources::unlimited(progress);
+        let mut found = SceneFaces::new(&resources);
+        let read = collada::read(input, &mut found, Allowance::UNLIMITED, progress, WHOLE);
+        read.and_then(|_| found.finish(input)).and_then(|()| found.into_mesh())
+    } else if input.format() == MeshFormat::Gltf {
         let mut found = gltf::InMemory::default();
         let read = gltf::read(input, &input.random_access()?, &mut found, Allowance::UNLIMITED, progress);
         read.map(|_| found.mesh)

@@ -101,6 +101,23 @@ fn glb(triangles: &[Triangle]) -> Vec<u8> {
     crate::glb(&json, &blob)
 }
 
+/// The mesh in units of half a metre, and with y pointing up.
+fn dae(triangles: &[Triangle]) -> Vec<u8> {
+    let mut numbers = String::new();
+    for [x, y, z] in triangles.as_flattened().iter().map(|p| p.map(|c| 2.0 * f64::from(c))) {
+        write!(numbers, "{x} {z} {} ", -y).unwrap();
+    }
+    let corners: Vec<String> = (0..3 * triangles.len()).map(|corner| corner.to_string()).collect();
+    let (count, values, corners) = (triangles.len(), 9 * triangles.len(), corners.join(" "));
+    format!(
+        "<COLLADA><asset><unit meter=\"0.5\"/></asset><library_geometries><geometry><mesh><source id=\"s\"><float_array id=\"a\" \
+         count=\"{values}\">{numbers}</float_array><technique_common><accessor source=\"#a\" stride=\"3\"/></technique_common></source>\
+         <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices><triangles count=\"{count}\"><input \
+         semantic=\"VERTEX\" source=\"#v\"/><p>{corners}</p></triangles></mesh></geometry></library_geometries></COLLADA>"
+    )
+    .into_bytes()
+}
+
 #[test]
 fn every_format_gives_the_same_content() {
     let triangles = sheet();
@@ -112,6 +129,7 @@ fn every_format_gives_the_same_content() {
         ("little-endian ply", MeshFormat::Ply, ply(&triangles, "binary_little_endian")),
         ("big-endian ply", MeshFormat::Ply, ply(&triangles, "binary_big_endian")),
         ("glb", MeshFormat::Gltf, glb(&triangles)),
+        ("dae", MeshFormat::Collada, dae(&triangles)),
     ];
     let meshes = files.map(|(name, format, bytes)| {
         let mesh = read_bytes(&bytes, format, Path::new("mesh")).unwrap_or_else(|e| panic!("{name}: {e}"));

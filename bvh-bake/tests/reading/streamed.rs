@@ -60,6 +60,13 @@ const PLY_FACES_FIRST: &str = "ply\nformat ascii 1.0\nelement face 2\nproperty l
     element vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
     3 0 1 2\n4 0 1 2 3\n0 0 0\n1 0 0\n1 1 0\n0 1 1e3\n";
 
+const DAE: &str = "<COLLADA>\n<asset><unit meter=\"0.5\"/></asset><library_geometries>\n<geometry id=\"g\" name=\"one\"><mesh>\
+    <source id=\"s\">\n<float_array id=\"a\" count=\"15\">0 0 0\n1.1 0 0\n1 1 0\n0 1 -0\n7 7 7</float_array>\n<technique_common>\
+    <accessor source=\"#a\" count=\"5\" stride=\"3\"/></technique_common></source>\n<vertices id=\"v\"><input semantic=\"POSITION\" \
+    source=\"#s\"/></vertices>\n<polylist count=\"3\"><input semantic=\"VERTEX\" source=\"#v\"/>\n<vcount>3 4 2</vcount>\n\
+    <p>0 1 2\n0 1 2 3\n1 2</p></polylist><triangles><input semantic=\"VERTEX\" source=\"#v\"/><p>2 1 0</p></triangles></mesh></geometry>\n\
+    </library_geometries><library_visual_scenes><visual_scene>\n<node name=\"a\"><instance_geometry url=\"#g\"/></node>\n\
+    <node name=\"b\"><scale>-1 1 2</scale><instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes></COLLADA>\n";
 const XYZ: &str = "# points\n0 0 0\n1,.5,1e-3 255\n1 .5 1e-3\n";
 const PCD: &str = "VERSION .7\nFIELDS x i y z\nSIZE 4 2 8 4\nTYPE F U F F\nWIDTH 3\nHEIGHT 1\nDATA ascii\n\
     0 1 0 0\n1 2 .5 1e-3\n1 3 .5 1e-3\n";
@@ -87,6 +94,7 @@ fn good_files_bake_alike() {
         ("a.ply", PLY),
         ("b.ply", PLY_FACES_FIRST),
         ("a", PLY),
+        ("a.dae", DAE),
         ("a.xyz", XYZ),
         ("a.pcd", PCD),
         ("c.ply", PLY_POINTS),
@@ -129,7 +137,7 @@ fn long_files_bake_alike() {
 #[test]
 fn bad_files_are_told_alike() {
     let folder = Folder::new();
-    let cases: [(&str, &str); 29] = [
+    let cases: [(&str, &str); 31] = [
         ("a.obj", ""),
         ("a.obj", "v 0 0 0\n"),
         ("a.obj", "v 0 0\nf 1 1 1"),
@@ -154,6 +162,8 @@ fn bad_files_are_told_alike() {
         ("a.ply", "ply\nformat ascii 1.0\nend_header\n"),
         ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9999999\nproperty float x\nend_header\n"),
         ("a.gltf", "{}"),
+        ("a.dae", "<COLLADA>"),
+        ("a.dae", "<COLLADA/>"),
         ("a.xyz", "0 0 0\n0 nan 0"),
         ("a.xyz", "#"),
         ("a.pcd", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 2\nDATA ascii\n1 2 3"),
@@ -162,6 +172,11 @@ fn bad_files_are_told_alike() {
     ];
     for (name, text) in cases {
         assert!(folder.compare(name, text.as_bytes()).is_err(), "{name}: {text}");
+    }
+    for (from, to) in
+        [("1.1", "1e37"), ("7 7 7", "7 7"), ("2 1 0", "2 1 5"), ("#g", "#h"), ("scale>", "skew>")]
+    {
+        assert!(folder.compare("a.dae", DAE.replace(from, to).as_bytes()).is_err(), "{to}");
     }
     for (from, to) in [("3 0 2 3", "3 0 2 4"), ("3 0 2 3", "3 0 2 5"), ("3 0 2 3", "2 0 2"), ("nan 5", "nan")]
     {
@@ -177,7 +192,8 @@ fn bad_files_are_told_alike() {
 fn damaged_files_are_told_alike() {
     let folder = Folder::new();
     let stl = binary_stl(5);
-    let files: [(&str, &[u8]); 5] = [
+    let files: [(&str, &[u8]); 6] = [
+        ("a.dae", DAE.as_bytes()),
         ("a.obj", OBJ.as_bytes()),
         ("a.stl", STL.as_bytes()),
         ("a.ply", PLY.as_bytes()),

@@ -248,7 +248,7 @@ typedef struct cbvh_bake_options {
     /* The following fields are 0 or 1. */
     /* Gives each object of the input a tree of its own. */
     int32_t split_objects;
-    /* Reads files as scenes: nodes of glTF files become instances. Files only. */
+    /* Reads files as scenes: nodes of glTF and COLLADA files become instances. Files only. */
     int32_t scene;
     /* Leaves out the numbers of the triangles in the input. */
     int32_t no_ids;
@@ -269,7 +269,7 @@ typedef struct cbvh_bake_options {
  * vertex that does not exist, a coordinate is not finite or beyond 2^120, or there are no faces. */
 cbvh_status cbvh_bake(const double *vertices, size_t vertex_count, const uint32_t *faces, size_t face_count,
                       const cbvh_bake_options *options, cbvh_mesh *mesh);
-/* Bakes mesh files (OBJ, STL, PLY, glTF) or points (XYZ, PCD, PLY) of any size into a .cbvh file, which is written completely or not at all. An
+/* Bakes mesh files (OBJ, STL, PLY, glTF, COLLADA) or points (XYZ, PCD, PLY) of any size into a .cbvh file, which is written completely or not at all. An
  * output that is up to date is not written again. `was_up_to_date` then gets 1, else 0; it may be NULL. */
 cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const char *output,
                             const cbvh_bake_options *options, int32_t *was_up_to_date);
@@ -1108,8 +1108,9 @@ typedef struct cbvh_robot_options {
     /* Lets the URDF name meshes anywhere (1), or only in the folder above its own and below, in its package, in packages
      * that it names, and in the folders of packages (0). */
     int32_t allow_outside;
-    /* 0. */
-    int32_t reserved;
+    /* Turns COLLADA meshes so that the axis that they declare to point up becomes z (1), or leaves their coordinates as
+     * they are (0), as rviz, MoveIt, Gazebo and Pinocchio do. Their unit of lengths is always applied. */
+    int32_t apply_up_axis;
 } cbvh_robot_options;
 
 /* A body of a robot. 0 is none. A robot and its clones never give the number of a removed body again. */

@@ -1358,6 +1358,7 @@ struct RobotOptions {
     bool visual = false;
     cbvh_robot_base base = CBVH_BASE_FIXED;
     bool allow_outside = false;
+    bool apply_up_axis = false;
 };
 
 /// A robot among obstacles, asked about with the values of its joints, which are in the order of joints(). Threads may ask
@@ -1396,6 +1397,7 @@ public:
         raw_options.visual = options.visual;
         raw_options.base = options.base;
         raw_options.allow_outside = options.allow_outside;
+        raw_options.apply_up_axis = options.apply_up_axis;
         return made([&](cbvh_robot *robot) {
             return cbvh_robot_from_urdf(detail::c_text("path", path), &raw_options, robot);
         });

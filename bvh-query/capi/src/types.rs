@@ -79,7 +79,7 @@ structures! {
         visual: i32,
         base: i32,
         allow_outside: i32,
-        reserved: i32,
+        apply_up_axis: i32,
     }
     RayRow { origin: [f64; 3], direction: [f64; 3], until: f64 }
     SegmentRow { from: [f64; 3], to: [f64; 3] }

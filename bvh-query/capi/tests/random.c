@@ -108,7 +108,7 @@ static const void *any_options(bool of_bake) {
 static const cbvh_robot_options *any_robot_options(void) {
     static cbvh_robot_options options;
     options = (cbvh_robot_options){.size = below(4) ? sizeof options : below(sizeof options), .visual = any_flag(),
-        .cylinder_error = below(2) ? 0 : any_number(), .base = any_flag()};
+        .cylinder_error = below(2) ? 0 : any_number(), .base = any_flag(), .apply_up_axis = any_flag()};
     return below(2) ? &options : NULL;
 }
 

@@ -613,14 +613,14 @@ static void misuse(void) {
         {.size = sizeof *options, .base = 3},
         {.size = sizeof *options, .visual = 2},
         {.size = sizeof *options, .allow_outside = 2},
-        {.size = sizeof *options, .reserved = 1},
+        {.size = sizeof *options, .apply_up_axis = 2},
         {.size = sizeof *options, .cylinder_error = -1},
         {.size = sizeof *options, .cylinder_error = NAN},
         {.size = sizeof *options, .package_count = 1},
         {.size = sizeof *options, .packages = folders, .package_count = 2},
     };
     const char *const messages[] = {"options.size: expected 64", "options.size", "options.base: expected a number of",
-        "options.visual: expected 0 or 1", "options.allow_outside: expected 0 or 1", "options.reserved: expected 0",
+        "options.visual: expected 0 or 1", "options.allow_outside: expected 0 or 1", "options.apply_up_axis: expected 0 or 1",
         "options.cylinder_error: expected 0 or", "options.cylinder_error",
         "options.packages: expected a pointer, found NULL", "options.packages[1]: expected a pointer, found NULL"};
     for (size_t k = 0; k < sizeof options / sizeof *options; k++) {

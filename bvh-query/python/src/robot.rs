@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::paths::locked;
 use bvh_query::{MotionOptions, OwnedShape, Pose};
 use cbvh_robot::{
-    Base, Edge, Geometry, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions, RobotParts,
+    Base, Edge, Geometry, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions, RobotParts, UpAxis,
 };
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -178,6 +178,7 @@ impl Robot {
         visual: bool,
         base: &str,
         cylinder_error: f64,
+        apply_up_axis: bool,
         cache: Option<PathBuf>,
         allow_outside: bool,
     ) -> PyResult<Self> {
@@ -187,6 +188,7 @@ impl Robot {
         options.base = base_of(base);
         options.cylinder_error = cylinder_error;
         options.allow_outside = allow_outside;
+        options.up_axis = if apply_up_axis { UpAxis::Turned } else { UpAxis::Kept };
         let robot = detached(py, || on_pool(|| cbvh_robot::Robot::from_urdf(path, &options)))?;
         Ok(Self::of(robot.map_err(robot_error)?, HashMap::new()))
     }

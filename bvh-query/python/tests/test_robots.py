@@ -273,6 +273,26 @@ class Describing(unittest.TestCase):
         for options in ({"allow_outside": True}, {"package_dirs": [URDF.parent]}):
             self.assertEqual(len(cbvh.Robot.from_urdf(path, **options).links), 5)
 
+    def test_the_axis_of_collada_counts_only_if_it_is_applied(self):
+        dae = (
+            '<COLLADA><asset><unit meter="0.01"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>'
+            '<source id="s"><float_array id="a">100 0 200 300 0 200 100 100 200</float_array><technique_common>'
+            '<accessor source="#a"/></technique_common></source><vertices id="v"><input semantic="POSITION" source="#s"/>'
+            '</vertices><triangles><input semantic="VERTEX" source="#v"/><p>0 1 2</p></triangles></mesh></geometry>'
+            "</library_geometries></COLLADA>"
+        )
+        (self.folder / "up.dae").write_text(dae, encoding="utf-8")
+        mesh = '<collision><geometry><mesh filename="up.dae"/></geometry></collision>'
+        urdf = self.write("up.urdf", f'<robot name="up"><link name="base">{mesh}</link></robot>')
+        for applied, touching in ((False, [1.1, 0.1, 2]), (True, [1.1, -2, 0.1])):
+            robot = cbvh.Robot.from_urdf(urdf, apply_up_axis=applied)
+            robot.add_obstacle(cbvh.sphere(0.001), name="probe")
+            for point in ([1.1, 0.1, 2], [1.1, -2, 0.1]):
+                robot.set_pose("probe", shifts(point)[0])
+                self.assertEqual(bool(robot.pairs_in_contact(robot.q())), point == touching)
+        mesh = cbvh.bake_files(self.folder / "up.dae", self.folder / "up.cbvh")
+        np.testing.assert_allclose(mesh.bounds, [[1, -2, 0], [3, -2, 1]], atol=1e-12)
+
     def test_robots_without_joints(self):
         path = self.write(
             "post.urdf",

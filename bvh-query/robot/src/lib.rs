@@ -12,7 +12,6 @@
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
 
 mod asker;
-mod collada;
 mod edge;
 mod error;
 mod frame;
@@ -33,6 +32,7 @@ mod turns;
 mod urdf;
 mod xml;
 
+pub use bvh_bake::input::UpAxis;
 pub use edge::Edge;
 pub use error::RobotError;
 pub use motions::RobotMotion;

@@ -1,5 +1,6 @@
 //! How a robot is read: which shapes, which base, and where meshes are.
 
+use bvh_bake::input::UpAxis;
 use std::path::PathBuf;
 
 /// Which shapes of links are asked about.
@@ -35,6 +36,10 @@ pub struct RobotOptions {
     pub geometry: Geometry,
     /// How the root is connected with the world.
     pub base: Base,
+    /// What to do with the axis that a COLLADA mesh declares to point up. By default coordinates stay as they are: rviz, MoveIt,
+    /// Gazebo and Pinocchio ignore the axis, and robots are modelled so that they look right there. The unit of lengths that a
+    /// mesh declares is always applied.
+    pub up_axis: UpAxis,
     /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000.
     pub cylinder_error: f64,
     /// A folder for baked meshes, under names that follow from what was read, so that they are baked once.
@@ -52,6 +57,7 @@ impl Default for RobotOptions {
             srdf: None,
             geometry: Geometry::Collision,
             base: Base::Fixed,
+            up_axis: UpAxis::Kept,
             cylinder_error: 1e-3,
             cache: None,
             allow_outside: false,

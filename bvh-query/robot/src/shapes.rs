@@ -1,21 +1,17 @@
 //! Makes the shapes of links: meshes from files, each read and baked once, and primitives.
 
-use crate::collada;
 use crate::error::RobotError;
 use crate::frame::Point;
 use crate::options::RobotOptions;
 use crate::packages::{find, folders_of};
 use crate::urdf::{Described, Element};
-use crate::xml::text_of;
 use bvh_bake::input::mesh::{Mesh, Object};
-use bvh_bake::{BakeError, Options, generator, read_meshes, shapes, to_bytes, write_atomically};
+use bvh_bake::input::read_with;
+use bvh_bake::{BakeError, Options, generator, shapes, to_bytes, write_atomically};
 use bvh_query::{Bvh, OwnedShape, QueryError};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
-
-/// The most bytes of a COLLADA file, which is read as a whole. Its elements may take several times as much memory.
-const MAX_COLLADA_BYTES: u64 = 1 << 30;
 
 /// Makes shapes, and keeps those of meshes.
 pub(crate) struct Shapes<'a> {
@@ -95,19 +91,8 @@ impl<'a> Shapes<'a> {
 
     /// Reads a mesh.
     fn read(&self, link: &str, path: &Path) -> Result<Mesh, RobotError> {
-        let is_collada = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dae"));
-        if !is_collada {
-            return Ok(read_meshes(&[path.to_owned()])
-                .map_err(|source| self.refused(link, source))?
-                .merged());
-        }
-        let text = text_of(path, MAX_COLLADA_BYTES)?;
-        collada::read(&text).map_err(|found| RobotError::Description {
-            path: self.urdf.to_owned(),
-            place: format!("link {link}, {}", path.display()),
-            expected: "a COLLADA file",
-            found,
-        })
+        let read = read_with(path, self.options.up_axis);
+        Ok(read.map_err(|error| self.refused(link, error.into()))?.merged())
     }
 
     /// Takes a mesh from the folder of baked meshes, or bakes it and puts it there.

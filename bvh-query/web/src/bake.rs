@@ -94,7 +94,7 @@ pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mes
     let format = format.ok_or_else(|| {
         wrong(
             name,
-            "expected a mesh in a file named .obj, .stl, .ply or .glb, or points in one named .xyz or .pcd, found content of no known format",
+            "expected a mesh in a file named .obj, .stl, .ply, .glb or .dae, or points in one named .xyz or .pcd, found content of no known format",
         )
     })?;
     let mesh = input::read_bytes(&bytes, format, path).map_err(refused)?;

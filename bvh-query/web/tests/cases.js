@@ -496,6 +496,20 @@ export const cases = {
         refused(() => cbvh.Mesh.bakeFile("outside.gltf", new TextEncoder().encode(JSON.stringify(outside))));
     },
 
+    "COLLADA becomes metres with z up": (cbvh) => {
+        const dae = `<COLLADA><asset><unit meter="0.01"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry><mesh>
+            <source id="s"><float_array id="a">100 0 200 300 0 200 100 100 200</float_array><technique_common>
+            <accessor source="#a"/></technique_common></source><vertices id="v"><input semantic="POSITION" source="#s"/>
+            </vertices><triangles><input semantic="VERTEX" source="#v"/><p>0 1 2</p></triangles></mesh></geometry>
+            </library_geometries></COLLADA>`;
+        for (const name of ["part.dae", "part"]) {
+            const mesh = cbvh.Mesh.bakeFile(name, new TextEncoder().encode(dae));
+            equal(Array.from(mesh.bounds, (value) => Math.round(value * 1e6) / 1e6), [1, -2, 0, 3, -2, 1], name);
+        }
+        const broken = new TextEncoder().encode(dae.replace("#s", "b.dae#s"));
+        ok(/^part.dae: line 3: .*other files are not read/.test(refused(() => cbvh.Mesh.bakeFile("part.dae", broken))), "a reference");
+    },
+
     "what a bake is told": (cbvh) => {
         const bake = (options) => cbvh.Mesh.bake(CUBE, CUBE_FACES, options);
         const sizes = ["f32", "packed", "quantized"].map((triangles) => bake({ triangles }).byteLength);

@@ -214,8 +214,8 @@ export class Mesh extends Handle<raw.Mesh> {
     /**
      * Bakes the bytes of a mesh file. All its objects become one.
      *
-     * @param name The name of the file. Its extension tells the format: .obj, .stl, .ply, .glb, or .gltf with all its
-     * buffers inside; .xyz, .pcd, or .ply without faces for points. With any other extension, the content tells the format.
+     * @param name The name of the file. Its extension tells the format: .obj, .stl, .ply, .glb, .gltf with all its
+     * buffers inside, or .dae (COLLADA, which becomes metres with z pointing up); .xyz, .pcd, or .ply without faces for points. With any other extension, the content tells the format.
      */
     static bakeFile(name: string, file: Bytes, options: BakeOptions = {}): Mesh {
         const [title, array, chosen] = [text(name, "name"), bytes(file, "bytes"), checked(options)];

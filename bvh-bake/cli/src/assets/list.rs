@@ -218,7 +218,7 @@ pub(super) fn read_folder(
     let inputs = files_below(folder, |path| MeshFormat::from_extension(path).is_some())?;
     if inputs.is_empty() {
         // Most likely the name is wrong, so that this counts as a missing file.
-        let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf, .glb, .xyz or .pcd, found none";
+        let what = "expected a mesh or a folder with files named .obj, .stl, .ply, .gltf, .glb, .dae, .xyz or .pcd, found none";
         return Err(Failure::system(folder, what));
     }
     let below: Vec<&Path> = inputs.iter().map(|input| input.strip_prefix(folder).unwrap_or(input)).collect();

@@ -69,6 +69,8 @@ fn most_triangles(input: &Path, length: u64) -> Option<u64> {
     let bytes_per_triangle = match MeshFormat::from_extension(input)? {
         MeshFormat::Stl => 50,
         MeshFormat::Ply | MeshFormat::Obj | MeshFormat::Xyz | MeshFormat::Pcd => 12,
+        // Three numbers of one digit with blanks between them.
+        MeshFormat::Collada => 6,
         // Three indices of two bytes. A .gltf file keeps its numbers in other files.
         MeshFormat::Gltf if input.extension().is_some_and(|name| name.eq_ignore_ascii_case("glb")) => 6,
         _ => return None,

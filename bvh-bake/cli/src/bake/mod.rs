@@ -131,7 +131,7 @@ its own name; an object that its file does not name is called after the file, wi
 The output appears whole or not at all. It is left alone if it is up to date, that is, if it is undamaged and was baked \
 from the same inputs with the same options by the same version; --force bakes it anyway.
 
-With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF file that has a \
+With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF or COLLADA file that has a \
 mesh becomes an instance. Nodes share their meshes: the file has one object for each mesh and scale. Each object of other \
 files becomes an instance where it stands. An instance has the name of its node; .2, .3 and so on are added to a name that \
 occurs again. cbvh scene asks about such a file.
@@ -145,12 +145,16 @@ expect, such as bytes that it left out.
 An XYZ file has a point per line; what follows its three numbers is ignored. Each point becomes a triangle whose corners are \
 equal, and points that coincide all stay. --radius and --solid are kept in the file, and every question respects them.
 
+A COLLADA file is scaled to metres and turned so that z points up, by the unit and the axis that it declares. What is \
+done is reported as a warning.
+
 A glTF file may name files that hold its buffers. They must be in the folder of the glTF file or below it, after symbolic \
 links are followed. --allow-outside allows buffers elsewhere: whoever made the glTF file then chooses which files are read.
 
 --max-memory SIZE keeps the whole process within SIZE, however large the mesh is. Files are read piece by piece, and up to \
 200 bytes per triangle go to scratch files. These have no names, and they vanish however the process ends. The output has \
-the same bytes. Pipes and the JSON of glTF files are held in memory as a whole, data URIs included. A SIZE that is too small \
+the same bytes. Pipes, COLLADA files and the JSON of glTF files are held in memory as a whole, data URIs \
+included. A SIZE that is too small \
 for the mesh exits with code 4.
 
 On a terminal, a line on standard error shows the stage, the share of it that is done, triangles per second, the bytes \
@@ -184,7 +188,7 @@ that have the same output, exits with code 3 before anything is baked.";
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct BakeArguments {
-    /// Meshes: OBJ, STL, PLY or glTF files; clouds of points: XYZ, PCD, or PLY files without faces; or one folder, whose
+    /// Meshes: OBJ, STL, PLY, glTF or COLLADA files; clouds of points: XYZ, PCD, or PLY files without faces; or one folder, whose
     /// files are baked to separate files
     #[arg(required_unless_present = "manifest", conflicts_with = "manifest", value_name = "IN")]
     pub(crate) inputs: Vec<PathBuf>,
@@ -229,7 +233,7 @@ pub(crate) struct BakeArguments {
     /// Build one tree per object of the input, so that queries can name an object
     #[arg(long)]
     pub(crate) split_objects: bool,
-    /// Bake a scene, with one tree per object: the nodes of glTF files become instances that share their meshes
+    /// Bake a scene, with one tree per object: the nodes of glTF and COLLADA files become instances that share their meshes
     #[arg(long)]
     pub(crate) scene: bool,
     /// Give the mesh a radius, in mesh units: it stands for all points this near to it, as each point of a cloud does for a ball

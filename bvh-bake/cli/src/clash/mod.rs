@@ -29,7 +29,7 @@ Examples:
   cbvh clash factory.cbvh --bcf clashes.bcfzip --view clashes.html
   cbvh clash --manifest parts.jsonl --shard 3/16 --json > clashes.3.json
 
-The parts are the instances of a scene (.glb and .gltf files, and what cbvh bake --scene made), the objects of a .cbvh file, \
+The parts are the instances of a scene (.glb, .gltf and .dae files, and what cbvh bake --scene made), the objects of a .cbvh file, \
 and other mesh files, each as a whole. A mesh file alone is split into its objects, and so are all with --split-objects. All \
 parts are in one frame. A part has the name of its instance or object, after the name of its file if several are given; the \
 files of a folder have their paths in it, without extensions. #2, #3 and so on are added to a name that occurs again.
@@ -46,7 +46,7 @@ Each pair that is not apart is a clash of one class:
 
 The list has them in this order, deep ones and near ones first. The depth is the length of the shortest move of the second part \
 after which they do not overlap; it is certainly between the two bounds. --visits limits the search for it, for each pair. \
-Lengths are in mesh units, which glTF defines as metres.
+Lengths are in mesh units, which are metres for glTF and COLLADA files.
 
 A part that is the same as an earlier one, with the same bits of its pose, is reported once, as a duplicate of that one. It is \
 not asked about other parts, because they clash with the earlier one in the same way.

@@ -43,7 +43,7 @@ pub(super) struct Assembly {
     pub(super) bounds: [[f64; 3]; 2],
     /// What the inputs are called in messages.
     pub(super) name: String,
-    /// Whether all inputs are glTF files, whose lengths are in metres.
+    /// Whether all inputs are glTF or COLLADA files, whose lengths are in metres.
     pub(super) is_in_metres: bool,
 }
 
@@ -114,7 +114,7 @@ impl Assembly {
         let triangles =
             parts.iter().map(|part| triangles_of(part.shape.objects())).fold(0, u64::saturating_add);
         let bounds = parts.iter().map(Part::bounds).fold(EMPTY, join);
-        Ok(Self { triangles, bounds, name, is_in_metres: distinct.iter().all(|path| is_gltf(path)), parts })
+        Ok(Self { triangles, bounds, name, is_in_metres: distinct.iter().all(|path| has_nodes(path)), parts })
     }
 
     /// Returns the length of the diagonal of the box around all parts.
@@ -205,7 +205,7 @@ fn inputs(arguments: &ClashArguments) -> Result<Vec<Input>, Failure> {
         };
         let files = files_below(path, is_part)?;
         if files.is_empty() {
-            let what = "expected a folder with files named .cbvh, .obj, .stl, .ply, .gltf, .glb, .xyz or .pcd, found none";
+            let what = "expected a folder with files named .cbvh, .obj, .stl, .ply, .gltf, .glb, .dae, .xyz or .pcd, found none";
             return Err(Failure::system(path, what));
         }
         for file in files {
@@ -238,7 +238,7 @@ fn read_file(path: &Path, files: &Files, splits: bool) -> Result<Vec<Part>, Fail
         let whole = files.shape(path)?;
         return parts_of(path, &bvh, |number| whole.object(number).unwrap_or_else(|| whole.clone()));
     }
-    let mut mesh = if splits || is_gltf(path) {
+    let mut mesh = if splits || has_nodes(path) {
         let read = read_scene(path);
         let mut mesh =
             told(read.map_err(|error| Failure::from_bake(path.display(), &BakeError::from(error))))?;
@@ -255,8 +255,9 @@ fn read_file(path: &Path, files: &Files, splits: bool) -> Result<Vec<Part>, Fail
     parts_of(path, &bvh, |number| open_object(&bvh, number))
 }
 
-fn is_gltf(path: &Path) -> bool {
-    MeshFormat::from_extension(path) == Some(MeshFormat::Gltf)
+/// Returns whether a file is of a format whose nodes are parts.
+fn has_nodes(path: &Path) -> bool {
+    matches!(MeshFormat::from_extension(path), Some(MeshFormat::Gltf | MeshFormat::Collada))
 }
 
 /// Returns an object of a file that stays open.

@@ -258,12 +258,17 @@ impl LoadedScene {
     }
 }
 
-/// Returns whether a file is a `.cbvh` file rather than a scene file. Refuses glTF, which is neither.
+/// Returns whether a file is a `.cbvh` file rather than a scene file. Refuses glTF and COLLADA, which are neither.
 pub(crate) fn is_baked_scene(path: &Path) -> Result<bool, Failure> {
     let is_baked = is_baked(path)?;
-    if !is_baked && MeshFormat::from_extension(path) == Some(MeshFormat::Gltf) {
+    let format = match MeshFormat::from_extension(path) {
+        Some(MeshFormat::Gltf) => Some("glTF"),
+        Some(MeshFormat::Collada) => Some("COLLADA"),
+        _ => None,
+    };
+    if let Some(format) = format.filter(|_| !is_baked) {
         let remedy = format!("cbvh bake {} --scene -o scene.cbvh", word(path));
-        let what = format_args!("expected a scene file, found glTF; bake it first: {remedy}");
+        let what = format_args!("expected a scene file, found {format}; bake it first: {remedy}");
         return Err(Failure::invalid(path, what));
     }
     Ok(is_baked)

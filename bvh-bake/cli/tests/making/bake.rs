@@ -350,3 +350,57 @@ fn clouds_radii_and_solids_are_baked() {
     assert_eq!((&dumped["radius"], &dumped["solid"]), (&0.25.into(), &true.into()));
     assert!(!names(directory).contains(&"s.cbvh".to_owned()));
 }
+
+/// Returns a COLLADA file of a box in inches with y up, in two places and sizes, and with a line.
+fn inches() -> String {
+    let corners = "0 0 0 1 0 0 0 1 0 1 1 0 0 0 2 1 0 2 0 1 2 1 1 2";
+    let sides = "0 2 3 1 4 5 7 6 0 1 5 4 2 6 7 3 0 4 6 2 1 3 7 5";
+    let input = "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>";
+    format!(
+        "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<COLLADA version=\"1.4.1\"><asset><unit name=\"inch\" meter=\"0.0254\"/>\
+         <up_axis>Y_UP</up_axis></asset><library_geometries><geometry id=\"g\" name=\"box\"><mesh><source id=\"s\"><float_array id=\"a\">\
+         {corners}</float_array><technique_common><accessor source=\"#a\" count=\"8\" stride=\"3\"/></technique_common></source>\
+         <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices><polylist count=\"6\">{input}\
+         <vcount>4 4 4 4 4 4</vcount><p>{sides}</p></polylist><lines count=\"1\">{input}<p>0 7</p></lines></mesh></geometry>\
+         </library_geometries><library_visual_scenes><visual_scene id=\"w\"><node name=\"one\"><instance_geometry url=\"#g\"/></node>\
+         <node name=\"two\"><translate>9 0 0</translate><scale>2 2 2</scale><instance_geometry url=\"#g\"/></node></visual_scene>\
+         </library_visual_scenes><scene><instance_visual_scene url=\"#w\"/></scene></COLLADA>\n"
+    )
+}
+
+#[test]
+fn collada_becomes_metres_with_z_up_and_says_so() {
+    let directory = &place();
+    fs::create_dir(directory.join("parts")).unwrap();
+    directory.write("parts/box.dae", inches());
+    directory.write("parts/nothing", inches());
+    let told = "parts/box.dae: scaled from units of 0.0254 metres to metres and turned from Y_UP to Z_UP";
+    for (arguments, objects, instances) in
+        [(&[][..], 1, 0), (&["--split-objects"], 2, 0), (&["--scene"], 2, 2)]
+    {
+        let bake = ["bake", "parts/box.dae", "-o", "box.cbvh", "--json", "-q"];
+        let baked = cbvh_in(directory, &[&bake[..], arguments].concat()).done().json();
+        assert_eq!((&baked["objects"], &baked["instances"]), (&objects.into(), &instances.into()));
+        assert_eq!(baked["triangles_in"], 24);
+        assert_eq!(baked["warnings"], serde_json::json!([told, "parts/box.dae: left out 2 lists of lines"]));
+        directory.cbvh("verify box.cbvh parts/box.dae").done();
+        assert!(directory.cbvh("validate box.cbvh").done().out.contains("valid"));
+    }
+    // One file is told by its content, and a folder is baked by extensions.
+    let said = directory.cbvh("bake parts/nothing -o nothing.cbvh -q");
+    assert!(said.code == 0 && said.err.starts_with("cbvh: warning: parts/nothing: scaled"), "{said:?}");
+    let said = directory.cbvh("bake parts -o baked");
+    assert!(said.code == 0 && said.err.contains("warning: parts/box.dae: scaled"), "{said:?}");
+    assert_eq!(names(&directory.join("baked")), ["box.cbvh"]);
+    directory.cbvh("scene parts/box.dae").failed(3, &["parts/box.dae: expected a scene file, found COLLADA"]);
+    let clash = directory.cbvh("clash parts/box.dae");
+    assert!(clash.code == 0 && clash.out.contains("2 parts") && clash.out.contains("metres"), "{clash:?}");
+    directory.write(
+        "parts/box.dae",
+        inches().replace("<instance_geometry url=\"#g\"/></node></v", "<instance_controller/></node></v"),
+    );
+    directory.cbvh("bake parts/box.dae -o box.cbvh").failed(
+        3,
+        &["parts/box.dae: line 2: expected an element that this reader knows, found <instance_controller>"],
+    );
+}

@@ -225,6 +225,14 @@ fn each_format_bakes_at_its_limit() {
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         count / 3
     );
+    let corners: Vec<String> = (0..count).map(|corner| corner.to_string()).collect();
+    let dae = format!(
+        "<COLLADA><library_geometries><geometry><mesh><source id=\"s\"><float_array id=\"a\">{ply}</float_array><technique_common>\
+         <accessor source=\"#a\"/></technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices>\
+         <triangles><input semantic=\"VERTEX\" source=\"#v\"/><p>{}</p></triangles></mesh></geometry></library_geometries></COLLADA>",
+        corners.join(" ")
+    );
+    directory.write("sheet.dae", dae);
     directory.write("text.ply", head + &ply + &faces);
     let indices: Vec<u8> = (0..count as u32).flat_map(u32::to_le_bytes).collect();
     directory.write("p.bin", &positions);
@@ -234,13 +242,21 @@ fn each_format_bakes_at_its_limit() {
     let inside = gltf(count, count, &uri(&positions), &uri(&indices));
     directory.write("inside.gltf", inside);
     let mut limits = Vec::new();
-    for input in ["sheet.obj", "sheet.stl", "sheet.ply", "text.stl", "text.ply", "beside.gltf", "inside.gltf"]
-    {
+    for input in [
+        "sheet.obj",
+        "sheet.stl",
+        "sheet.ply",
+        "text.stl",
+        "text.ply",
+        "beside.gltf",
+        "inside.gltf",
+        "sheet.dae",
+    ] {
         limits.push((input, bakes_at_its_limit(directory, &[input, "-o", "out.cbvh", "-q"])));
     }
     // Formats that are read piece by piece need no more for a longer file.
     let least = limits.iter().map(|(_, limit)| *limit).min().unwrap();
-    let piecewise = limits.iter().filter(|(input, _)| *input != "inside.gltf");
+    let piecewise = limits.iter().filter(|(input, _)| !["inside.gltf", "sheet.dae"].contains(input));
     assert!(piecewise.clone().all(|(_, limit)| *limit == least), "{limits:?}");
     // Two inputs are one mesh, and a folder is many.
     bakes_at_its_limit(directory, &["sheet.obj", "beside.gltf", "-o", "out.cbvh", "-q"]);
@@ -304,7 +320,20 @@ fn what_is_kept_counts() {
     directory.write("objects.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{objects}"));
     let solids = "solid\nfacet normal 0 0 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\nendsolid\n";
     directory.write("solids.stl", solids.repeat(60_000));
-    for input in ["nodes.gltf", "objects.obj", "solids.stl"] {
+    let triangle = "<geometry id=\"g\"><mesh><source id=\"s\"><float_array id=\"a\">0 0 0 1 0 0 0 1 0</float_array><technique_common>\
+                    <accessor source=\"#a\"/></technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/>\
+                    </vertices><triangles><input semantic=\"VERTEX\" source=\"#v\"/><p>0 1 2</p></triangles></mesh></geometry>";
+    let dae = |nodes: &str| {
+        format!(
+            "<COLLADA><library_geometries>{triangle}</library_geometries><library_visual_scenes><visual_scene>\
+             {nodes}</visual_scene></library_visual_scenes></COLLADA>"
+        )
+    };
+    let instance = "<node id=\"n\"><instance_geometry url=\"#g\"/></node>";
+    directory.write("nodes.dae", dae(&(instance.to_owned() + &"<node id=\"m\"/>".repeat(300_000))));
+    directory.write("deep.dae", dae(&("<node>".repeat(200_000) + instance + &"</node>".repeat(200_000))));
+    directory.write("instances.dae", dae(&instance.repeat(60_000)));
+    for input in ["nodes.gltf", "objects.obj", "solids.stl", "nodes.dae", "deep.dae", "instances.dae"] {
         bakes_at_its_limit(directory, &[input, "-o", "out.cbvh", "-q"]);
     }
 }

@@ -121,7 +121,7 @@ pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
 #[non_exhaustive]
 pub struct VerifyOptions {
     /// The most memory that the whole process may have resident, in bytes; `None` for 1.5 GiB. Data that do not fit go
-    /// to scratch files. Of the meshes, only the JSON of glTF files and files that are not regular are read into memory
+    /// to scratch files. Of the meshes, only COLLADA files, the JSON of glTF files, and files that are not regular are read into memory
     /// as a whole. If the allocator keeps much of the freed memory, tell it not to; see
     /// [`FileBake::max_memory`](crate::FileBake::max_memory).
     pub max_memory: Option<u64>,

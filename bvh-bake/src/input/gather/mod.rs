@@ -11,6 +11,7 @@ mod solids;
 mod vertex_counter;
 
 pub(crate) use input_order::InputOrder;
+pub(crate) use scene::SceneFaces;
 
 use super::indexed::IndexedFaces;
 use super::input_file::Opener;
@@ -136,8 +137,8 @@ impl<'a> Gatherer<'a> {
     /// Reads a file piece by piece.
     pub(crate) fn read(&mut self, input: &InputFile) -> Result<Checksums, BakeError> {
         let (before, first_object) = (self.triangles, self.names.len());
-        let checksums = if input.format() == MeshFormat::Gltf {
-            self.read_gltf(input).map_err(|halt| halt.in_file(input.path()))?
+        let checksums = if matches!(input.format(), MeshFormat::Gltf | MeshFormat::Collada) {
+            self.read_scene(input).map_err(|halt| halt.in_file(input.path()))?
         } else {
             let (progress, checksum) = (&self.resources.progress, OnceLock::new());
             let read = thread::scope(|scope| {
@@ -181,7 +182,7 @@ impl<'a> Gatherer<'a> {
                 pcd::read(open(POINT_BYTES)(true)?, &mut faces, self.resources)?;
                 (Names::unnamed(), WHOLE - POINT_BYTES)
             }
-            MeshFormat::Gltf => return Ok(()),
+            MeshFormat::Gltf | MeshFormat::Collada => unreachable!("these are no streams"),
         };
         let length = opener.input.length();
         let tally = self.resources.progress.tally(Step::Read, left, length, faces.corner_count());
@@ -189,7 +190,7 @@ impl<'a> Gatherer<'a> {
     }
 
     /// Names the objects from the number `first` on after their file, if objects stay separate and have no name. A glTF
-    /// file has named the instances of its meshes.
+    /// or COLLADA file has named the instances of its meshes.
     fn name_after(&mut self, input: &InputFile, first: usize) {
         if self.split || input.is_scene() {
             let unnamed = self.names[first..].iter_mut().filter(|(name, _)| name.is_empty());

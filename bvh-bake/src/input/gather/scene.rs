@@ -1,15 +1,17 @@
-//! Gathers what a glTF file holds: its objects, and the instances if it is read as a scene.
+//! Gathers what a glTF or a COLLADA file holds: its objects, and the instances if it is read as a scene.
 
 use super::Gatherer;
-use crate::error::{Halt, InputError, ReadError, excerpt};
+use crate::error::{Fault, Halt, InputError, Place, ReadError, excerpt};
+use crate::input::collect::mesh_of_faces;
 use crate::input::gltf::Sink;
 use crate::input::indexed::IndexedFaces;
-use crate::input::mesh::{Instance, check_instances, tell_apart};
+use crate::input::mesh::{Instance, Mesh, check_instances, tell_apart};
 use crate::input::names::Names;
-use crate::input::{Checksums, InputFile};
+use crate::input::{COORDINATE, Checksums, InputFile, MeshFormat, collada};
 use crate::limits::coordinate_fits;
 use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
+use std::collections::BTreeMap;
 
 /// The share of reading a file in the work on it, in parts of [`WHOLE`]. The rest is spent on its corners.
 const FILE_BYTES: u64 = 10;
@@ -18,17 +20,63 @@ const BYTES_PER_INSTANCE: u64 = 320;
 /// Bytes of memory per object until its triangles are gathered, besides its name.
 const BYTES_PER_OBJECT: u64 = 64;
 
-/// What has been found so far.
-struct Found<'a> {
+/// The objects of a file that have been read so far, and its instances.
+pub(crate) struct SceneFaces<'a> {
     resources: &'a Resources,
     faces: IndexedFaces,
     names: Vec<String>,
     /// The first vertex of each object.
     vertices: Vec<u64>,
     instances: Vec<Instance>,
+    /// What was read without its faces, and how often.
+    left_out: BTreeMap<&'static str, u64>,
 }
 
-impl Sink for Found<'_> {
+impl<'a> SceneFaces<'a> {
+    pub(crate) fn new(resources: &'a Resources) -> Self {
+        let (names, vertices, instances) = (Vec::new(), Vec::new(), Vec::new());
+        let left_out = BTreeMap::new();
+        Self { resources, faces: IndexedFaces::new(resources), names, vertices, instances, left_out }
+    }
+
+    /// Counts what has no triangles.
+    pub(crate) fn leave_out(&mut self, what: &'static str) {
+        *self.left_out.entry(what).or_default() += 1;
+    }
+
+    /// Adds faces to the last object, each with so many corners.
+    pub(crate) fn faces(&mut self, corners_per_face: usize, corners: &[u32]) -> Result<(), Halt> {
+        let (object, faces) = (self.names.len() as u32 - 1, corners.len() / corners_per_face);
+        Ok(self.faces.add_run(corners_per_face as u32, faces as u32, object, object, corners)?)
+    }
+
+    /// Ends the file, and checks what the reader does not: the coordinates that faces use.
+    pub(crate) fn finish(&mut self, input: &InputFile) -> Result<(), Halt> {
+        self.faces.finish()?;
+        let warn = |(what, count)| input.warnings().add(Place::File, format!("left out {count} {what}"));
+        self.left_out.iter().for_each(warn);
+        let Some((corner, vertex)) = self.faces.first_misfit(None)? else { return Ok(()) };
+        let object = self.vertices.partition_point(|&first| first <= u64::from(vertex)) - 1;
+        let position = self.faces.sorted_look_up(&[vertex])?;
+        let misfit = position.as_flattened().iter().copied().find(|&value| !coordinate_fits(value));
+        let (name, found) = (excerpt(self.names[object].as_bytes()), misfit.unwrap_or_default());
+        let vertex = (u64::from(vertex) - self.vertices[object]) as u32;
+        if input.format() == MeshFormat::Collada {
+            let found = format!("{found:e} in vertex {vertex} of object \"{name}\"");
+            return Err(Fault::new(Place::File, COORDINATE, found).into());
+        }
+        let source = InputError::Coordinate { object: name, triangle: (corner / 3) as u32, vertex, found };
+        Err(ReadError::Mesh { path: input.path().to_owned(), source }.into())
+    }
+
+    /// Collects a mesh in memory.
+    pub(crate) fn into_mesh(self) -> Result<Mesh, Halt> {
+        let mesh = mesh_of_faces(&self.faces, &Names::of_objects(self.names))?;
+        Ok(Mesh { instances: self.instances, ..mesh })
+    }
+}
+
+impl Sink for SceneFaces<'_> {
     fn begin(&mut self, name: &str) -> Result<(), Halt> {
         self.resources.keep(BYTES_PER_OBJECT + name.len() as u64)?;
         self.names.push(name.to_owned());
@@ -45,8 +93,7 @@ impl Sink for Found<'_> {
     }
 
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<(), Halt> {
-        let object = self.names.len() as u32 - 1;
-        Ok(self.faces.add_run(3, triangles.len() as u32, object, object, triangles.as_flattened())?)
+        self.faces(3, triangles.as_flattened())
     }
 
     fn instance(&mut self, instance: Instance) -> Result<(), Halt> {
@@ -57,47 +104,28 @@ impl Sink for Found<'_> {
 }
 
 impl Gatherer<'_> {
-    /// Reads a glTF file.
-    pub(super) fn read_gltf(&mut self, input: &InputFile) -> Result<Checksums, Halt> {
+    /// Reads a glTF or a COLLADA file.
+    pub(super) fn read_scene(&mut self, input: &InputFile) -> Result<Checksums, Halt> {
         let resources = self.resources;
-        let mut found = Found {
-            resources,
-            faces: IndexedFaces::new(resources),
-            names: Vec::new(),
-            vertices: Vec::new(),
-            instances: Vec::new(),
-        };
+        let mut found = SceneFaces::new(resources);
         let progress = &resources.progress;
-        let checksums = Checksums::of_gltf(input, &mut found, resources.document, progress, FILE_BYTES)?;
-        found.faces.finish()?;
-        let wrong = |source| Halt::from(ReadError::Mesh { path: input.path().to_owned(), source });
-        found.check().map_err(|fault| fault.map_or_else(|halt| halt, wrong))?;
-        let Found { faces, names, mut instances, .. } = found;
+        let checksums = if input.format() == MeshFormat::Gltf {
+            Checksums::of_gltf(input, &mut found, resources.document, progress, FILE_BYTES)?
+        } else {
+            collada::read(input, &mut found, resources.document, progress, FILE_BYTES)?;
+            Checksums { file: input.checksum(progress, 0)?, mesh: None }
+        };
+        found.finish(input)?;
+        let SceneFaces { faces, names, mut instances, .. } = found;
         let first = self.names.len();
         let tally = progress.tally(Step::Read, WHOLE - FILE_BYTES, input.length(), faces.corner_count());
         self.add_faces(&faces, &Names::of_objects(names), &tally)?;
         instances.iter_mut().for_each(|instance| instance.object += first as u32);
         instances.retain(|instance| self.names[instance.object as usize].1);
         tell_apart(&mut instances);
+        let wrong = |source| Halt::from(ReadError::Mesh { path: input.path().to_owned(), source });
         check_instances(&instances, self.names.len()).map_err(wrong)?;
         self.instances.append(&mut instances);
         Ok(checksums)
-    }
-}
-
-impl Found<'_> {
-    /// Checks what the reader does not: the coordinates that triangles use.
-    fn check(&self) -> Result<(), Result<InputError, Halt>> {
-        let failed = |error: crate::error::BakeError| Err(error.into());
-        let Some((corner, vertex)) = self.faces.first_misfit(None).map_err(failed)? else { return Ok(()) };
-        let object = self.vertices.partition_point(|&first| first <= u64::from(vertex)) - 1;
-        let position = self.faces.sorted_look_up(&[vertex]).map_err(failed)?;
-        let found = position.as_flattened().iter().copied().find(|&value| !coordinate_fits(value));
-        Err(Ok(InputError::Coordinate {
-            object: excerpt(self.names[object].as_bytes()),
-            triangle: (corner / 3) as u32,
-            vertex: (u64::from(vertex) - self.vertices[object]) as u32,
-            found: found.unwrap_or_default(),
-        }))
     }
 }

@@ -1,8 +1,8 @@
 //! The parts of a glTF document from which triangles come, as its JSON has them (glTF 2.0 specification, section 5). All others,
 //! such as materials and skins, are skipped.
 
-use super::frame::Transform;
 use crate::error::{Fault, Place};
+use crate::input::frame::Transform;
 use serde::Deserialize;
 
 /// A parsed document. `check` must pass before any number of a part is used as a place in a list.

@@ -12,6 +12,8 @@
 //! its inside differ, a fan covers every point that the polygon winds around, and clipping such polygons takes cubic
 //! time. The same input always gives the same triangles.
 //!
+//! A polygon with holes is projected with the normal of its outline, and `earcut` connects the holes with it.
+//!
 //! A file may hold polygons whose time would grow with the square of the number of their corners. The steps for a long
 //! polygon are therefore limited per corner, which limits the time per byte of a file. Usual outlines, and combs of
 //! 32,000 teeth, take less than a quarter of the limit.
@@ -21,6 +23,7 @@ mod ears;
 use crate::error::{Fault, Place};
 use earcut::Earcut;
 use ears::{OutOfSteps, Steps};
+use std::ops::Range;
 
 /// The most corners of a polygon.
 pub(crate) const MAX_CORNERS: usize = 1 << 16;
@@ -61,9 +64,35 @@ impl Cutter {
         triangles.into_iter().try_for_each(give)
     }
 
+    /// Cuts a polygon with holes as [`cut_polygon`](Self::cut_polygon) does without. The corners of the outline are followed by those of
+    /// one hole after the other, which begin at `holes`.
+    pub(crate) fn cut_with_holes<E: From<Fault>>(
+        &mut self,
+        corners: &[[f64; 3]],
+        holes: &[u32],
+        give: impl FnMut([usize; 3]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Some(&outline) = holes.first() else { return self.cut_polygon(corners, give) };
+        if corners.len() > MAX_UNCOUNTED {
+            let what = "corners of a face with holes (cut it into smaller faces)";
+            return Err(Fault::Limit { place: Place::File, most: MAX_UNCOUNTED as u64, what }.into());
+        }
+        let outline = outline as usize;
+        // An outline without area has no inside for holes.
+        if !self.flatten(corners, outline) {
+            return fan(outline).into_iter().try_for_each(give);
+        }
+        self.ears.clear();
+        self.earcut.earcut_slice(&self.flat, holes, &mut self.ears);
+        let ends = holes.iter().skip(1).map(|&hole| hole as usize).chain([corners.len()]);
+        let rings = holes.iter().zip(ends).map(|(&start, end)| start as usize..end);
+        let rings: Vec<Range<usize>> = [0..outline].into_iter().chain(rings).collect();
+        self.triangles_of_ears(corners, &rings).into_iter().try_for_each(give)
+    }
+
     fn cut(&mut self, corners: &[[f64; 3]]) -> Result<Vec<[usize; 3]>, OutOfSteps> {
         let count = corners.len();
-        if count < 4 || !self.flatten(corners) {
+        if count < 4 || !self.flatten(corners, count) {
             return Ok(fan(count));
         }
         if let [a, b, c, d] = self.flat[..] {
@@ -82,11 +111,11 @@ impl Cutter {
         } else if !ears::clip(&self.flat, &mut steps, &mut self.ears)? {
             return Ok(fan(count));
         }
-        Ok(self.triangles_of_ears(corners))
+        Ok(self.triangles_of_ears(corners, &[0..count]))
     }
 
-    /// Turns ears into triangles of the polygon, and adds the corners that were left out.
-    fn triangles_of_ears(&mut self, corners: &[[f64; 3]]) -> Vec<[usize; 3]> {
+    /// Turns ears into triangles of the polygon, and adds the corners of its rings that were left out.
+    fn triangles_of_ears(&mut self, corners: &[[f64; 3]], rings: &[Range<usize>]) -> Vec<[usize; 3]> {
         let ears = self.ears.as_chunks::<3>().0.iter().map(|ear| ear.map(|corner| corner as usize));
         // Ear clipping has a winding of its own. The polygon's winding is positive here, and the triangles must keep
         // it.
@@ -100,25 +129,32 @@ impl Cutter {
         self.kept.clear();
         self.kept.resize(corners.len(), false);
         triangles.iter().flatten().for_each(|&corner| self.kept[corner] = true);
-        let Some(start) = self.kept.iter().position(|&kept| kept) else { return fan(corners.len()) };
-        let mut last = start;
-        for step in 1..corners.len() {
-            let [here, next] = [step, step + 1].map(|step| (start + step) % corners.len());
-            if self.kept[here] {
-                last = here;
-            } else if has_area([last, here, next].map(|corner| corners[corner])) {
-                triangles.push([last, here, next]);
+        if triangles.is_empty() {
+            return fan(rings[0].end);
+        }
+        for ring in rings {
+            let Some(start) = self.kept[ring.clone()].iter().position(|&kept| kept) else { continue };
+            let mut last = ring.start + start;
+            for step in 1..ring.len() {
+                let [here, next] = [step, step + 1].map(|step| ring.start + (start + step) % ring.len());
+                if self.kept[here] {
+                    last = here;
+                } else if has_area([last, here, next].map(|corner| corners[corner])) {
+                    triangles.push([last, here, next]);
+                }
             }
         }
         triangles
     }
 
-    /// Projects the polygon into `self.flat`, counter-clockwise. Returns false if the polygon has no area.
-    fn flatten(&mut self, corners: &[[f64; 3]]) -> bool {
+    /// Projects the polygon into `self.flat`, so that its outline, the first corners, is counter-clockwise. Returns false if the
+    /// outline has no area.
+    fn flatten(&mut self, corners: &[[f64; 3]], outline: usize) -> bool {
         let relative = |corner: &[f64; 3]| [0, 1, 2].map(|axis| corner[axis] - corners[0][axis]);
         let mut normal = [0.0; 3];
-        let mut previous = relative(&corners[corners.len() - 1]);
-        for corner in corners {
+        let outline = &corners[..outline];
+        let Some(mut previous) = outline.last().map(relative) else { return false };
+        for corner in outline {
             let current = relative(corner);
             for axis in 0..3 {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -430,6 +466,41 @@ mod tests {
             Ok(())
         });
         assert!(given.is_ok() && count >= 898, "{given:?} {count}");
+    }
+
+    #[test]
+    fn holes_are_left_free() {
+        let square =
+            |[x, y]: [f64; 2], side: f64| [[x, y], [x + side, y], [x + side, y + side], [x, y + side]];
+        let ring = |points: [[f64; 2]; 4], turns: bool| {
+            if turns { [3, 2, 1, 0].map(|at: usize| points[at]) } else { points }
+        };
+        // Holes of both windings, also with a corner on the outline, in outlines of both windings.
+        for number in 0..8 {
+            let [first, second, outline] = [1, 2, 4].map(|bit| number & bit > 0);
+            let holes = [ring(square([1.0, 1.0], 2.0), first), ring(square([0.0, 4.0], 1.0), second)];
+            let points = [ring(square([0.0, 0.0], 10.0), outline), holes[0], holes[1]].concat();
+            let corners: Vec<_> = points.iter().map(|&[x, y]| [y, x, x + y]).collect();
+            let mut triangles = Vec::new();
+            let cut = Cutter::default().cut_with_holes(&corners, &[4, 8], |triangle| {
+                triangles.push(triangle);
+                Ok::<_, Fault>(())
+            });
+            cut.unwrap();
+            let (signed, unsigned) = areas(&points, &triangles);
+            assert_eq!((signed, unsigned), (if outline { -95.0 } else { 95.0 }, 95.0), "{number}");
+        }
+        let cut = |corners: usize, holes: &[u32]| {
+            let mut count = 0;
+            let give = |_| {
+                count += 1;
+                Ok::<_, Fault>(())
+            };
+            Cutter::default().cut_with_holes(&vec![[0.0; 3]; corners], holes, give).map(|()| count)
+        };
+        // Without an area, with no outline, and with too many corners.
+        assert!(matches!((cut(8, &[4]), cut(4, &[0]), cut(3, &[1, 1, 3])), (Ok(2), Ok(0), Ok(0))));
+        assert!(matches!(cut(MAX_UNCOUNTED + 1, &[4]), Err(Fault::Limit { most: 1024, .. })));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Reads malformed files: a folder of them, random bytes and damaged files.
 
 use super::clouds::{pcd, ply_of_points};
+use super::collada::{HERE, faces, square};
 use super::gltf::{INDEXED, glb, gltf};
 use super::{CORNERS, TWO, binary_stl, one_line, ply, try_bytes};
 use bvh_bake::input::{MeshFormat, read};
@@ -123,13 +124,42 @@ fn seeds() -> Vec<(MeshFormat, Vec<u8>)> {
         (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], "ascii")),
         (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], "binary")),
         (MeshFormat::Pcd, pcd(&[[0.0, 1.0, 2.0]; 9], "binary_compressed")),
+        (MeshFormat::Collada, collada().into_bytes()),
+        (MeshFormat::Collada, collada().encode_utf16().flat_map(u16::to_le_bytes).collect()),
         (MeshFormat::Gltf, glb(&gltf(r#"{"children":[1]},{"mesh":0}"#, sparse, ""))),
         (MeshFormat::Gltf, gltf(r#"{"mesh":0}"#, INDEXED, r#","uri":"data:;base64,AgEAAAAA""#).into_bytes()),
     ]
 }
 
-const FORMATS: [MeshFormat; 6] =
-    [MeshFormat::Obj, MeshFormat::Stl, MeshFormat::Ply, MeshFormat::Gltf, MeshFormat::Xyz, MeshFormat::Pcd];
+/// Returns a file with every kind of primitive and of transform.
+fn collada() -> String {
+    let all = [
+        faces("triangles", "<p>9 0 9 1 9 2</p>"),
+        faces("polylist", "<vcount>4 3</vcount><p>9 0 9 1 9 2 9 3 9 0 9 1 9 2</p>"),
+        faces("polygons", "<p>9 0 9 1 9 2 9 3</p><ph><p>9 0 9 1 9 2 9 3</p><h>9 0 9 1 9 2</h></ph>"),
+        faces("tristrips", "<p>9 0 9 1 9 3 9 2</p>"),
+        faces("trifans", "<p>9 0 9 1 9 2 9 3</p>"),
+    ];
+    let transforms = "<matrix>0 -1 0 5 1 0 0 0 0 0 1 0 0 0 0 1</matrix><lookat>5 0 0 0 0 0 0 0 1</lookat><rotate>0 0 1 30</rotate>\
+                      <scale>1 -2 3</scale><skew>45 0 1 0 1 0 0</skew><translate>1 2 3</translate>";
+    let nodes = format!(
+        "{HERE}<node><!-- &amp; -->{transforms}<instance_node url=\"#n\"/><instance_geometry url=\"#g\"/></node>"
+    );
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?><!DOCTYPE COLLADA [<!ENTITY a \"b\">]>{}",
+        square(&all.concat(), &nodes)
+    )
+}
+
+const FORMATS: [MeshFormat; 7] = [
+    MeshFormat::Obj,
+    MeshFormat::Stl,
+    MeshFormat::Ply,
+    MeshFormat::Gltf,
+    MeshFormat::Collada,
+    MeshFormat::Xyz,
+    MeshFormat::Pcd,
+];
 
 /// Asserts what must hold for any bytes.
 fn survives(bytes: &[u8], format: MeshFormat) {
@@ -151,6 +181,28 @@ proptest! {
     #[test]
     fn statements_at_random_never_panic(text in "([vfog] |[-0-9./ ]{1,9}|nan|1e999|[\\\\\n\r#]){0,60}") {
         survives(text.as_bytes(), MeshFormat::Obj);
+    }
+
+    #[test]
+    fn elements_at_random_never_panic(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 1..6),
+    ) {
+        let mut text = collada();
+        for (from, to) in edits {
+            let places = |text: &str| text.match_indices('<').map(|(at, _)| at).collect::<Vec<_>>();
+            // An element and what follows it up to the next one goes elsewhere.
+            let all = places(&text);
+            let start = all[from.index(all.len())];
+            let end = all.iter().copied().find(|&at| at > start).unwrap_or(text.len());
+            let piece = text[start..end].to_owned();
+            text.replace_range(start..end, "");
+            let rest = places(&text);
+            if rest.is_empty() {
+                break;
+            }
+            text.insert_str(rest[to.index(rest.len())], &piece);
+        }
+        survives(text.as_bytes(), MeshFormat::Collada);
     }
 
     #[test]
@@ -181,7 +233,7 @@ proptest! {
         edits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 1..5),
     ) {
         let mut documents = seeds();
-        documents.retain(|(format, _)| matches!(format, MeshFormat::Gltf | MeshFormat::Pcd));
+        documents.retain(|(format, _)| matches!(format, MeshFormat::Gltf | MeshFormat::Collada | MeshFormat::Pcd));
         let (format, mut bytes) = documents.swap_remove(seed.index(documents.len()));
         let digits: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at].is_ascii_digit()).collect();
         for (at, digit) in edits {

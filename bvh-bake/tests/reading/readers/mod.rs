@@ -2,6 +2,7 @@
 
 mod any_bytes;
 mod clouds;
+mod collada;
 mod gltf;
 /// Windows lets few users make links, and has no pipes in folders.
 #[cfg(unix)]

@@ -19,7 +19,7 @@ use crate::types::{
     MeshHandle, PoseRows, RobotChoices, RobotCounts, RobotHandle,
 };
 use bvh_query::OwnedShape;
-use cbvh_robot::{Base, Geometry, Robot, RobotOptions};
+use cbvh_robot::{Base, Geometry, Robot, RobotOptions, UpAxis};
 use std::ffi::c_char;
 
 /// All robots that are open.
@@ -65,12 +65,12 @@ unsafe fn choices(pointer: *const RobotChoices) -> Result<RobotOptions, Failure>
             return Err(Failure::argument("options.cylinder_error", "0 or a finite number above 0", error));
         }
     }
-    if given.reserved != 0 {
-        return Err(Failure::argument("options.reserved", 0, given.reserved));
-    }
     options.allow_outside = flag("options.allow_outside", given.allow_outside)?;
     if flag("options.visual", given.visual)? {
         options.geometry = Geometry::Visual;
+    }
+    if flag("options.apply_up_axis", given.apply_up_axis)? {
+        options.up_axis = UpAxis::Turned;
     }
     options.base = match given.base {
         BASE_FIXED => Base::Fixed,

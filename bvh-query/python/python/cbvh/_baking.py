@@ -120,7 +120,7 @@ def bake_files(
     max_memory: int | None = None,
     force: bool = False,
 ) -> Mesh:
-    """Bakes mesh files (OBJ, STL, PLY, glTF) or points (XYZ, PCD, PLY) into a ``.cbvh`` file, and opens it.
+    """Bakes mesh files (OBJ, STL, PLY, glTF, COLLADA) or points (XYZ, PCD, PLY) into a ``.cbvh`` file, and opens it.
 
     If the file is up to date, nothing is done, unless ``force``. ``max_memory``: the most bytes of memory; the rest
     goes to scratch files, so a mesh may be larger than memory. The other options are those of `bake`. The environment

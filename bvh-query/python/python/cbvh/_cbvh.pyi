@@ -153,6 +153,7 @@ class Robot:
         visual: bool,
         base: str,
         cylinder_error: float,
+        apply_up_axis: bool,
         cache: str | None,
         allow_outside: bool,
     ) -> Robot: ...

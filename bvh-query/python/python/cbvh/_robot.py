@@ -95,6 +95,7 @@ class Robot:
         geometry: Literal["collision", "visual"] = "collision",
         base: Literal["fixed", "planar", "floating"] = "fixed",
         cylinder_error: float = 1e-3,
+        apply_up_axis: bool = False,
         cache: str | os.PathLike[str] | None = None,
         allow_outside: bool = False,
     ) -> Robot:
@@ -103,7 +104,9 @@ class Robot:
         ``package://`` paths are looked for in ``package_dirs``, in ``ROS_PACKAGE_PATH`` and in the folders above the file.
         Pairs of links that ``srdf`` disables are not asked about. A ``base`` that moves adds joint values: ``base/x``,
         ``base/y`` and ``base/theta``, or ``base/x`` to ``base/z`` and a quaternion, ``base/qx`` to ``base/qw``. A cylinder is a
-        prism around it, wider by at most ``cylinder_error`` of its radius. ``cache`` names a folder for baked meshes.
+        prism around it, wider by at most ``cylinder_error`` of its radius. ``apply_up_axis`` turns COLLADA meshes so that the
+        axis that they declare to point up becomes z; rviz, MoveIt, Gazebo and Pinocchio leave them as they are. Their unit is always
+        applied. ``cache`` names a folder for baked meshes.
 
         Meshes must be in the folder above that of the file or below it, in its package, in a package that a ``package://`` path
         names, or in ``package_dirs``; ``allow_outside=True`` lets the file name any. What is passed over is in `warnings`.
@@ -126,6 +129,7 @@ class Robot:
                 geometry == "visual",
                 base,
                 float(cylinder_error),
+                bool(apply_up_axis),
                 None if cache is None else os.fspath(cache),
                 bool(allow_outside),
             )

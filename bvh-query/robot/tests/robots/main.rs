@@ -4,6 +4,7 @@
 mod bodies;
 mod files;
 mod kinematics;
+mod meshes;
 mod misuse;
 mod parts;
 mod questions;

@@ -5,7 +5,7 @@ import { h } from "./dom.js";
 import { describe, messageOf } from "./errors.js";
 import type { View } from "./view.js";
 
-const ACCEPTED = ".cbvh,.obj,.stl,.ply,.glb,.gltf,.xyz,.pcd";
+const ACCEPTED = ".cbvh,.obj,.stl,.ply,.glb,.gltf,.dae,.xyz,.pcd";
 
 export class Drop {
     readonly #input = h("input", {

@@ -18,11 +18,11 @@ pub(super) enum Transform {
 }
 
 pub(super) const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-const UNIT: Linear = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+pub(super) const UNIT: Linear = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// How far the columns of a matrix of f32 numbers may be from a rotation times scales to be taken as one: twice what rounding
 /// its entries to f32 does.
-const MATRIX_ERROR: f64 = 1.0 / (1u32 << 22) as f64;
+pub(super) const MATRIX_ERROR: f64 = 1.0 / (1u32 << 22) as f64;
 
 /// A node's place in the world: a point x of its mesh is at R (S x) + t. The rotation R and the translation t are the
 /// pose of an instance. S holds the scales and whatever else is left, and is baked into the mesh. Nodes that differ
@@ -38,11 +38,15 @@ impl Frame {
     /// The frame of the world.
     pub(super) const WORLD: Self = Self { rotation: UNIT, shape: UNIT, translation: [0.0; 3] };
 
-    /// Returns the frame of a child with this transform: R' = R Rc, S' = (Rc^T S Rc) Sc, t' = R S tc + t. Where S is a
-    /// single factor, or Rc is the identity, no rounding of Rc gets into S'.
+    /// Returns the frame of a child with this transform.
     pub(super) fn of_child(&self, transform: Transform, scales: &mut Scales) -> Self {
+        self.then(&Self::local(transform, scales))
+    }
+
+    /// Returns the frame of a child whose own frame is `child`: R' = R Rc, S' = (Rc^T S Rc) Sc, t' = R S tc + t. Where S
+    /// is a single factor, or Rc is the identity, no rounding of Rc gets into S'.
+    pub(super) fn then(&self, child: &Self) -> Self {
         let Self { rotation, shape, translation } = *self;
-        let child = Self::local(transform, scales);
         let turned = if child.rotation == UNIT || is_one_factor(&shape) {
             shape
         } else {
@@ -64,13 +68,20 @@ impl Frame {
                 shape: diagonal(scale.map(f64::from)),
                 translation: translation.map(f64::from),
             },
-            Transform::Matrix { matrix } => {
-                let columns = [0, 1, 2].map(|column| [0, 1, 2].map(|row| f64::from(matrix[column][row])));
-                let (rotation, shape) = divided(columns, scales);
-                let translation = [0, 1, 2].map(|row| f64::from(matrix[3][row]));
-                Self { rotation, shape, translation }
-            }
+            Transform::Matrix { .. } => Self::of_matrix(&local(transform), scales),
         }
+    }
+
+    /// Divides a matrix.
+    pub(super) fn of_matrix(matrix: &Affine, scales: &mut Scales) -> Self {
+        let columns = [0, 1, 2].map(|column| matrix.map(|row| row[column]));
+        let (rotation, shape) = divided(columns, scales);
+        Self { rotation, shape, translation: matrix.map(|row| row[3]) }
+    }
+
+    /// Returns the frame that only scales.
+    pub(super) fn of_scales(scales: [f64; 3]) -> Self {
+        Self { shape: diagonal(scales), ..Self::WORLD }
     }
 
     /// Returns whether S turns a mesh inside out.
@@ -91,11 +102,15 @@ pub(super) struct Scales(BTreeSet<u64>);
 impl Scales {
     /// Knows the scale 1, and those that nodes of a document state.
     pub(super) fn of(transforms: impl Iterator<Item = Transform>) -> Self {
-        let stated = transforms.flat_map(|transform| match transform {
-            Transform::Decomposed { scale, .. } => scale.map(|scale| f64::from(scale.abs())),
+        Self::stated(transforms.flat_map(|transform| match transform {
+            Transform::Decomposed { scale, .. } => scale.map(f64::from),
             Transform::Matrix { .. } => [1.0; 3],
-        });
-        let above_0 = stated.filter(|&scale| scale > 0.0 && scale.is_finite());
+        }))
+    }
+
+    /// Knows the scale 1 and these.
+    pub(super) fn stated(scales: impl Iterator<Item = f64>) -> Self {
+        let above_0 = scales.map(f64::abs).filter(|&scale| scale > 0.0 && scale.is_finite());
         Self(above_0.chain([1.0]).map(f64::to_bits).collect())
     }
 
@@ -140,7 +155,7 @@ fn divided(columns: [[f64; 3]; 3], known: &mut Scales) -> (Linear, Linear) {
     (transposed(&[x, y, cross(x, y)]), diagonal(scales))
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
@@ -152,7 +167,7 @@ fn diagonal([x, y, z]: [f64; 3]) -> Linear {
     [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -160,7 +175,7 @@ fn minus(a: [f64; 3], b: [f64; 3], factor: f64) -> [f64; 3] {
     [0, 1, 2].map(|axis| a[axis] - factor * b[axis])
 }
 
-fn normalised(a: [f64; 3]) -> [f64; 3] {
+pub(super) fn normalised(a: [f64; 3]) -> [f64; 3] {
     let length = dot(a, a).sqrt();
     a.map(|value| value / length)
 }
