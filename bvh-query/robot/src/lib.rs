@@ -41,3 +41,8 @@ pub use parts::{OtherBody, RobotParts};
 pub use questions::RobotDistance;
 pub use robot::Robot;
 pub use srdf::{Group, State};
+
+/// Compiles the example of the crate's README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
