@@ -4,7 +4,7 @@
 //     from_coal FOLDER_OF_MESHES FOLDER_FOR_BAKED_FILES
 //
 // What differs: a mesh is baked once, into a file or into memory, and needs no class of bounding volume. A question
-// takes one pose, of B in A's frame. Distances are 0 where meshes touch; Querier::penetrations bounds the depth. Answers are
+// takes one pose, of B in A's frame. Distances are 0 where meshes touch; Querier::penetration bounds the depth. Answers are
 // exact, so that there are no tolerances to choose. A Tracker does what Coal's guesses do from question to question.
 #include <cbvh.hpp>
 
