@@ -21,18 +21,19 @@
 //! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
 //! | is a motion free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
-//! [`Scene`] answers these questions about many placed shapes, over all pairs that matter. [`Tracker`] answers them in
-//! less time for poses that follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points,
-//! rays and segments. Batches, and scenes on all cores, need the feature `parallel`, which is on by default and adds
-//! the dependency on rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the
-//! features `trace` and `stages` are for tools: one records which nodes and packets a question visits, the other measures
-//! how long the stages of a question take. Points, rays and segments are given in the frame of a mesh or, for a mesh that
-//! [`Shape::at`] places in the world, in the world. Each kind of operation has an error of its own, and all of them
-//! convert into [`Error`].
+//! [`Scene`] answers these questions about many placed shapes, over all pairs that matter, except for contact regions,
+//! patches, self contacts, penetrations and separations, which a [`Querier`] answers pair by pair. [`Tracker`] answers
+//! whether two meshes touch, how far apart they are and whether they are within a distance in less time, for poses that
+//! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
+//! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
+//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the features `trace` and `stages`
+//! are for tools: one records which nodes and packets a question visits, the other measures how long the stages of a
+//! question take. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
+//! the world, in the world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
-//! A query walks both trees together. Nodes and triangles are filtered in `f32`, 16 pairs at a time, by AVX-512, AVX2,
-//! NEON, SIMD128 or portable code. What the filters cannot decide goes to `f64` and exact predicates. So the answers have
-//! the same bits on every backend and in every order of queries.
+//! A query about two meshes walks both trees together, and one about a point or a line walks one tree. Nodes and triangles
+//! are filtered in `f32`, 16 at a time, by AVX-512, AVX2, NEON, SIMD128 or portable code. What the filters cannot decide
+//! goes to `f64` and exact predicates. So the answers have the same bits on every backend and in every order of queries.
 //!
 //! # Debug builds
 //! Without optimisation, queries are about a hundred times slower: a program that takes 0.18 seconds with these lines in the

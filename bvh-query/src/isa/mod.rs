@@ -297,9 +297,9 @@ pub enum Backend {
     /// Portable code. On `wasm32-unknown-unknown` with SIMD128, this runs SIMD128 instead: no user chooses a backend there, and a
     /// page would have to load the code of both.
     Scalar,
-    /// AVX2, FMA and F16C.
+    /// AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
     Avx2,
-    /// AVX-512 F, VL, DQ and BW.
+    /// AVX-512 F, VL, DQ and BW, and everything that [`Backend::Avx2`] requires.
     Avx512,
     /// NEON, which every CPU of AArch64 has.
     Neon,

@@ -1,4 +1,4 @@
-//! The pair walk on which every query stands: both trees, visited together.
+//! The pair walk, on which queries about two meshes and motions stand: both trees, visited together.
 //!
 //! ```text
 //! entries := {(root a, root b)}
