@@ -197,7 +197,7 @@ impl<'a> Document<'a> {
                 character.is_whitespace() || matches!(character, '\0' | '\u{1a}' | '\u{feff}')
             };
             if let Some(other) = text.find(|character| !is_blank(character)) {
-                let found = excerpt(text[other..].as_bytes());
+                let found = excerpt(&text.as_bytes()[other..]);
                 return Err(Fault::new(
                     self.line(range.start + other),
                     "the element <COLLADA> and no more",

@@ -90,21 +90,21 @@ pub(super) fn read(
 struct Units {
     metres: f64,
     /// What turns the axis up to z, and its name, if that is to be done.
-    turn: Option<(Linear, &'static str)>,
+    turn: Option<Axis>,
 }
 
 impl Units {
     /// Reads the units of a file. All parts of a file have the same.
     fn of(document: &Document, up_axis: UpAxis) -> Result<Self, Fault> {
         let whole = document.only_child(Document::ROOT, Tag::Asset)?;
-        let stated = |asset| -> Result<(Option<f64>, Option<(Linear, &'static str)>), Fault> {
-            Ok((metres(document, asset)?, axis(document, asset)?))
+        let (metres, axis) = match whole {
+            Some(asset) => (stated_metres(document, asset)?, stated_axis(document, asset)?),
+            None => (None, None),
         };
-        let (metres, axis) = whole.map_or(Ok((None, None)), stated)?;
         let (metres, (turn, name)) = (metres.unwrap_or(1.0), axis.unwrap_or(Y_UP));
         for part in document.all(Tag::Asset).filter(|&asset| Some(asset) != whole) {
-            let (own_metres, own_axis) = stated(part)?;
-            if own_metres.is_some_and(|own| own != metres) || own_axis.is_some_and(|(_, own)| own != name) {
+            let (own, own_axis) = (stated_metres(document, part)?, stated_axis(document, part)?);
+            if own.is_some_and(|own| own != metres) || own_axis.is_some_and(|(_, own)| own != name) {
                 let expected =
                     format!("the unit and the axis of the whole file, {metres:?} metres and {name}");
                 return Err(document.fault(part, expected, "others for a part of it"));
@@ -131,13 +131,16 @@ impl Units {
     }
 }
 
-/// The axis of a file that declares none, with its name, and the turn from it to z.
-const Y_UP: (Linear, &str) = ([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], "Y_UP");
-const X_UP: (Linear, &str) = ([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], "X_UP");
-const Z_UP: (Linear, &str) = (UNIT, "Z_UP");
+/// An axis that may point up: the turn from it to z, and its name.
+type Axis = (Linear, &'static str);
+
+/// The axis of a file that declares none.
+const Y_UP: Axis = ([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], "Y_UP");
+const X_UP: Axis = ([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], "X_UP");
+const Z_UP: Axis = (UNIT, "Z_UP");
 
 /// Returns the unit that an asset states.
-fn metres(document: &Document, asset: Number) -> Result<Option<f64>, Fault> {
+fn stated_metres(document: &Document, asset: Number) -> Result<Option<f64>, Fault> {
     let Some(unit) = document.only_child(asset, Tag::Unit)? else { return Ok(None) };
     let Some(stated) = document.attribute(unit, Attribute::Meter) else { return Ok(None) };
     let metres = stated.trim().parse().ok().filter(|&metres: &f64| metres > 0.0 && metres.is_finite());
@@ -148,7 +151,7 @@ fn metres(document: &Document, asset: Number) -> Result<Option<f64>, Fault> {
 }
 
 /// Returns the axis that an asset states to point up.
-fn axis(document: &Document, asset: Number) -> Result<Option<(Linear, &'static str)>, Fault> {
+fn stated_axis(document: &Document, asset: Number) -> Result<Option<Axis>, Fault> {
     let Some(axis) = document.only_child(asset, Tag::UpAxis)? else { return Ok(None) };
     let stated = document.words(axis)?.collect::<Vec<_>>().join(" ");
     let known = [X_UP, Y_UP, Z_UP].into_iter().find(|(_, name)| *name == stated);

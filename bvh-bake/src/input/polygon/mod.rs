@@ -23,7 +23,6 @@ mod ears;
 use crate::error::{Fault, Place};
 use earcut::Earcut;
 use ears::{OutOfSteps, Steps};
-use std::ops::Range;
 
 /// The most corners of a polygon.
 pub(crate) const MAX_CORNERS: usize = 1 << 16;
@@ -84,10 +83,9 @@ impl Cutter {
         }
         self.ears.clear();
         self.earcut.earcut_slice(&self.flat, holes, &mut self.ears);
-        let ends = holes.iter().skip(1).map(|&hole| hole as usize).chain([corners.len()]);
-        let rings = holes.iter().zip(ends).map(|(&start, end)| start as usize..end);
-        let rings: Vec<Range<usize>> = [0..outline].into_iter().chain(rings).collect();
-        self.triangles_of_ears(corners, &rings).into_iter().try_for_each(give)
+        let ends = holes.iter().map(|&hole| hole as usize).chain([corners.len()]);
+        let ends: Vec<usize> = ends.collect();
+        self.triangles_of_ears(corners, &ends).into_iter().try_for_each(give)
     }
 
     fn cut(&mut self, corners: &[[f64; 3]]) -> Result<Vec<[usize; 3]>, OutOfSteps> {
@@ -111,11 +109,12 @@ impl Cutter {
         } else if !ears::clip(&self.flat, &mut steps, &mut self.ears)? {
             return Ok(fan(count));
         }
-        Ok(self.triangles_of_ears(corners, &[0..count]))
+        Ok(self.triangles_of_ears(corners, &[count]))
     }
 
-    /// Turns ears into triangles of the polygon, and adds the corners of its rings that were left out.
-    fn triangles_of_ears(&mut self, corners: &[[f64; 3]], rings: &[Range<usize>]) -> Vec<[usize; 3]> {
+    /// Turns ears into triangles of the polygon, and adds the corners that were left out, ring by ring. The
+    /// rings follow each other, and end at `ends`.
+    fn triangles_of_ears(&mut self, corners: &[[f64; 3]], ends: &[usize]) -> Vec<[usize; 3]> {
         let ears = self.ears.as_chunks::<3>().0.iter().map(|ear| ear.map(|corner| corner as usize));
         // Ear clipping has a winding of its own. The polygon's winding is positive here, and the triangles must keep
         // it.
@@ -130,9 +129,11 @@ impl Cutter {
         self.kept.resize(corners.len(), false);
         triangles.iter().flatten().for_each(|&corner| self.kept[corner] = true);
         if triangles.is_empty() {
-            return fan(rings[0].end);
+            return fan(ends[0]);
         }
-        for ring in rings {
+        let starts = [0].into_iter().chain(ends.iter().copied());
+        for (first, &end) in starts.zip(ends) {
+            let ring = first..end;
             let Some(start) = self.kept[ring.clone()].iter().position(|&kept| kept) else { continue };
             let mut last = ring.start + start;
             for step in 1..ring.len() {

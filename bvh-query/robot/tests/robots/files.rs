@@ -332,9 +332,10 @@ fn a_collada_file_that_repeats_itself_has_a_limit() {
     let folder = cbvh_testkit::folder();
     let (instances, counts) = ("<instance_geometry url=\"#g\"/>".repeat(100_000), "0 ".repeat(1_000_000));
     let text = format!(
-        "<COLLADA><library_geometries><geometry id=\"g\"><mesh><source id=\"s\"><float_array>0 0 0 1 0 0 0 1 0</float_array></source>\
+        "<COLLADA><library_geometries><geometry id=\"g\"><mesh><source id=\"s\"><float_array id=\"a\">0 0 0 1 0 0 0 1 0</float_array>\
+         <technique_common><accessor source=\"#a\"/></technique_common></source>\
          <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices>\
-         <polylist><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><vcount>{counts}</vcount><p>0</p></polylist></mesh>\
+         <polylist><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><vcount>{counts}</vcount><p/></polylist></mesh>\
          </geometry></library_geometries><library_visual_scenes><visual_scene id=\"w\"><node>{instances}</node></visual_scene>\
          </library_visual_scenes><scene><instance_visual_scene url=\"#w\"/></scene></COLLADA>"
     );
@@ -342,7 +343,7 @@ fn a_collada_file_that_repeats_itself_has_a_limit() {
     write_urdf(&folder.path().join("r.urdf"), "d.dae");
     let told =
         Robot::from_urdf(folder.path().join("r.urdf"), &RobotOptions::default()).unwrap_err().to_string();
-    assert!(told.contains("d.dae"), "{told}");
+    assert!(told.contains("d.dae: expected at most") && told.contains("bytes of geometries"), "{told}");
 }
 
 /// Whatever the texts hold, reading them ends with a robot or an error.
