@@ -1,11 +1,11 @@
 //! Bakes a mesh from a build script.
 
-use crate::bake::files::FileBake;
+use crate::bake::files::{FileBake, Outcome};
 use crate::error::BakeError;
 use std::path::{Path, PathBuf};
 
 /// Bakes a mesh file into the directory of a build script's outputs, with default options, and tells
-/// Cargo to run the script again when the mesh changes. Returns the path of the baked file.
+/// Cargo to run the script again when the mesh changes, and the warnings of the bake. Returns the path of the baked file.
 ///
 /// In `build.rs`:
 ///
@@ -26,7 +26,9 @@ pub fn bake(input: impl AsRef<Path>, output_name: impl AsRef<Path>) -> Result<Pa
     tell_cargo(&format!("rerun-if-changed={}", input.display()));
     let directory = std::env::var_os("OUT_DIR").ok_or(BakeError::NoOutDir)?;
     let output = Path::new(&directory).join(output_name);
-    FileBake::new([input], &output).run()?;
+    if let Outcome::Baked(report) = FileBake::new([input], &output).run()? {
+        report.warnings.iter().for_each(|warning| tell_cargo(&format!("warning={warning}")));
+    }
     Ok(output)
 }
 

@@ -59,6 +59,9 @@ pub struct Options {
     /// Whether [`crate::FileBake`] reads its inputs as scenes ([`crate::input::read_scene`]): the nodes of glTF and COLLADA files
     /// and the objects of other files become instances. Each object then gets its own tree.
     pub scene: bool,
+    /// Whether points without a position are left out of clouds: those with a coordinate that is NaN or infinite. By default,
+    /// they are refused.
+    pub drop_nan: bool,
     /// Whether the original triangle numbers are kept.
     pub ids: bool,
     /// Whether children get turning slabs, if the profile has room for them. Answers and the size of files are the
@@ -82,6 +85,7 @@ impl Default for Options {
             effort: Effort::Default,
             split_objects: false,
             scene: false,
+            drop_nan: false,
             ids: true,
             turning_slabs: true,
             radius: 0.0,
@@ -128,6 +132,12 @@ impl Options {
         Self { scene, ..self }
     }
 
+    /// Sets whether points without a position are left out of clouds.
+    #[must_use]
+    pub fn drop_nan(self, drop_nan: bool) -> Self {
+        Self { drop_nan, ..self }
+    }
+
     /// Sets whether the original triangle numbers are kept.
     #[must_use]
     pub fn ids(self, ids: bool) -> Self {
@@ -161,7 +171,7 @@ impl Options {
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
@@ -170,6 +180,7 @@ impl Options {
             self.ids,
             if self.turning_slabs { "" } else { " turning_slabs=false" },
             if self.scene { " scene=true" } else { "" },
+            if self.drop_nan { " drop_nan=true" } else { "" },
             if self.topology { "" } else { " topology=false" },
             if self.radius == 0.0 { String::new() } else { format!(" radius={:?}", self.radius) },
             if self.solid { " solid=true" } else { "" }

@@ -202,7 +202,7 @@ impl<'a> FileBake<'a> {
             let input = InputFile::find(path, self.memory_of_inputs(taken), &self.progress)
                 .map_err(|halt| halt.in_file(path))?;
             taken += input.bytes_in_memory();
-            inputs.push(input.for_scene(self.options.scene).allow_outside(self.allow_outside));
+            inputs.push(input.with_options(&self.options).allow_outside(self.allow_outside));
         }
         Ok(inputs)
     }

@@ -5,7 +5,7 @@ mod read;
 mod shape;
 
 pub use mesh::InputError;
-pub(crate) use read::{Fault, Halt, excerpt, quoted};
+pub(crate) use read::{Fault, Halt, excerpt, quoted, sentence};
 pub use read::{Place, ReadError};
 pub use shape::ShapeError;
 

@@ -178,7 +178,14 @@ impl Fault {
 
 /// Quotes text of a file for a message: one line, no control characters, at most about 60 bytes.
 pub(crate) fn excerpt(text: &[u8]) -> String {
-    let head = &text[..text.len().min(EXCERPT_BYTES)];
+    let mut head = &text[..text.len().min(EXCERPT_BYTES)];
+    // A quotation ends after a word, unless one word is most of it.
+    let is_cut = text.get(EXCERPT_BYTES).is_some_and(|byte| !byte.is_ascii_whitespace());
+    if let Some(end) =
+        head.iter().rposition(u8::is_ascii_whitespace).filter(|&end| is_cut && end > EXCERPT_BYTES / 2)
+    {
+        head = &head[..end];
+    }
     let mut quoted = String::from_utf8_lossy(head).escape_debug().to_string();
     if quoted.chars().count() > EXCERPT_BYTES {
         quoted = quoted.chars().take(EXCERPT_BYTES).collect();
@@ -189,12 +196,30 @@ pub(crate) fn excerpt(text: &[u8]) -> String {
     quoted
 }
 
+/// The most letters of a parser's message that an error repeats.
+const SENTENCE_LETTERS: usize = 240;
+
+/// Repeats the message of a parser, on one line and without control characters. A message that is longer than any parser needs,
+/// because it quotes the file, ends after a word.
+pub(crate) fn sentence(message: &str) -> String {
+    let whole = plain(message);
+    match whole.char_indices().nth(SENTENCE_LETTERS) {
+        None => whole,
+        Some((end, _)) => {
+            let head = &whole[..end];
+            format!("{} …", head.rsplit_once(' ').map_or(head, |(words, _)| words))
+        }
+    }
+}
+
 /// Quotes a whole path without its control characters.
 pub(crate) fn quoted(path: &Path) -> String {
-    path.to_string_lossy()
-        .chars()
-        .flat_map(|c| if c.is_control() { c.escape_debug().collect() } else { vec![c] })
-        .collect()
+    plain(&path.to_string_lossy())
+}
+
+/// Escapes control characters.
+fn plain(text: &str) -> String {
+    text.chars().flat_map(|c| if c.is_control() { c.escape_debug().collect() } else { vec![c] }).collect()
 }
 
 #[cfg(test)]

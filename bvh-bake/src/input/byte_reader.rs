@@ -3,8 +3,8 @@
 //! Memory and files are read in the same way. An error that is no fault of the text, such as one of the system, is kept
 //! in `stopped`. It looks like the end of the file until `finish` returns it.
 
-use super::text::{is_blank, number};
-use crate::error::{Fault, Halt, Place, excerpt};
+use super::text::{is_blank, number, wrong_number};
+use crate::error::{Fault, Halt, Place};
 use std::io::Read;
 
 /// The number of bytes that are read at a time.
@@ -117,6 +117,20 @@ impl<R: Read> ByteReader<R> {
         }
     }
 
+    /// Takes all bytes that are left. Returns their number, less the NUL, blanks and ends of lines at the end, with which some
+    /// programs fill up a file.
+    pub(crate) fn take_rest(&mut self) -> u64 {
+        let (first, mut end) = (self.position(), self.position());
+        while self.has(1) {
+            let rest = &self.buffer[self.start..self.end];
+            if let Some(last) = rest.iter().rposition(|byte| !b"\0 \t\r\n".contains(byte)) {
+                end = self.position() + last as u64 + 1;
+            }
+            self.start = self.end;
+        }
+        end - first
+    }
+
     /// Steps back over the byte that was taken last.
     pub(crate) fn step_back(&mut self) {
         self.start = self.start.saturating_sub(1);
@@ -221,6 +235,20 @@ impl<R: Read> Words<R> {
         self.until(|byte| byte == b'\n' || byte == b'\r')
     }
 
+    /// Returns the next word if it is on the line of the last one, without taking it.
+    pub(crate) fn more_on_line(&mut self) -> Option<Word> {
+        while !self.at_line_start && self.reader.has(1) && is_blank(self.reader.buffer[self.reader.start]) {
+            self.reader.start += 1;
+        }
+        let ends = |byte: u8| byte == b'\n' || byte == b'\r';
+        if self.at_line_start || !self.reader.has(1) || ends(self.reader.buffer[self.reader.start]) {
+            return None;
+        }
+        let word = self.until(|byte| is_blank(byte) || ends(byte))?;
+        self.reader.start = word.start;
+        Some(word)
+    }
+
     /// Returns the next line from its first letter, and whether CR LF ended it.
     pub(crate) fn line(&mut self) -> Option<(Vec<u8>, bool)> {
         self.byte()?;
@@ -242,7 +270,7 @@ impl<R: Read> Words<R> {
     pub(crate) fn number(&mut self) -> Result<f64, Fault> {
         let word = self.expect("a number")?;
         let text = self.text(word);
-        number(text).ok_or_else(|| Fault::new(self.place(), "a number", excerpt(text)))
+        number(text).ok_or_else(|| Fault::new(self.place(), "a number", wrong_number(text)))
     }
 }
 

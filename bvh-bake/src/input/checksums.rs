@@ -33,6 +33,7 @@ impl Checksums {
         progress: &Progress,
         weight: u64,
     ) -> Result<Self, Halt> {
+        input.look(progress)?;
         let mesh = gltf::read(input, &input.random_access()?, sink, memory, progress)?;
         // The document is not in memory any more.
         Ok(Self { file: input.checksum(progress, weight)?, mesh: Some(mesh) })

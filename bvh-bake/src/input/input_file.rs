@@ -2,11 +2,13 @@
 //! read.
 
 use super::byte_reader::ByteReader;
+use super::head::{HEAD_BYTES, misnamed};
 #[cfg(not(target_family = "wasm"))]
 use super::read_ahead::ReadAhead;
 use super::warnings::Warnings;
 use super::{MeshFormat, UpAxis};
 use crate::error::{Halt, ReadError};
+use crate::options::Options;
 use crate::progress::{Progress, Step, Tally};
 use crate::storage::read_exact_at;
 use crate::storage::resources::Allowance;
@@ -22,8 +24,6 @@ use std::thread::Scope;
 const READ_BYTES: u64 = 4 << 20;
 /// The number of bytes that are read at a time for a checksum.
 const CHECKSUM_BYTES: usize = 1 << 18;
-/// The number of bytes from which the format is recognised.
-const HEAD_BYTES: u64 = 4096;
 
 /// An input with a known format.
 pub(crate) struct InputFile<'a> {
@@ -35,6 +35,8 @@ pub(crate) struct InputFile<'a> {
     up_axis: UpAxis,
     /// Whether a glTF file may name files outside its folder.
     allows_outside: bool,
+    /// Whether points without a position are left out.
+    drops_nan: bool,
     /// The bytes if they are in memory. The bytes of a pipe always are, because a pipe can be read only once.
     bytes: Option<Cow<'a, [u8]>>,
     warnings: Warnings,
@@ -50,7 +52,8 @@ impl<'a> InputFile<'a> {
 
     fn new(path: &'a Path, format: MeshFormat, length: u64, bytes: Option<Cow<'a, [u8]>>) -> Self {
         let (path, up_axis, warnings) = (Cow::Borrowed(path), UpAxis::default(), Warnings::default());
-        Self { path, format, length, as_scene: false, up_axis, allows_outside: false, bytes, warnings }
+        let (as_scene, allows_outside, drops_nan) = (false, false, false);
+        Self { path, format, length, as_scene, up_axis, allows_outside, drops_nan, bytes, warnings }
     }
 
     /// Sets whether the nodes of a glTF or COLLADA file become instances.
@@ -69,6 +72,20 @@ impl<'a> InputFile<'a> {
 
     pub(crate) fn up_axis(&self) -> UpAxis {
         self.up_axis
+    }
+
+    /// Applies the options that concern reading.
+    pub(crate) fn with_options(self, options: &Options) -> Self {
+        self.for_scene(options.scene).drop_nan(options.drop_nan)
+    }
+
+    /// Sets whether points without a position are left out: those with a coordinate that is NaN or infinite.
+    pub(crate) fn drop_nan(self, drops_nan: bool) -> Self {
+        Self { drops_nan, ..self }
+    }
+
+    pub(crate) fn drops_nan(&self) -> bool {
+        self.drops_nan
     }
 
     /// Sets whether a glTF file may name files outside its folder.
@@ -93,11 +110,13 @@ impl<'a> InputFile<'a> {
         memory.require(bytes.as_ref().map_or(0, |bytes| bytes.len() as u64))?;
         let length = bytes.as_ref().map_or(reader.length, |bytes| bytes.len() as u64);
         let format = match (MeshFormat::from_extension(path), &bytes) {
-            (Some(format), _) => Some(format),
-            (None, Some(bytes)) => MeshFormat::from_content(bytes),
-            (None, None) => MeshFormat::from_head(&reader.read_up_to(HEAD_BYTES).map_err(failed)?, length),
+            (Some(format), _) => format,
+            (None, Some(bytes)) => MeshFormat::of_file(path, bytes)?,
+            (None, None) => {
+                let head = reader.read_up_to(HEAD_BYTES as u64).map_err(failed)?;
+                MeshFormat::of_head(path, &head, length)?
+            }
         };
-        let format = format.ok_or_else(|| super::unknown_format(path))?;
         let bytes = bytes.map(Cow::Owned);
         Ok(Self::new(path, format, length, bytes))
     }
@@ -158,6 +177,18 @@ impl<'a> InputFile<'a> {
                 };
                 open().map_err(|source| self.failed(source))
             }
+        }
+    }
+
+    /// Refuses a file whose first bytes show that it holds no mesh of its format. Files that are read in order are looked at when
+    /// they are opened.
+    pub(crate) fn look(&self, progress: &Progress) -> Result<(), Halt> {
+        let access = self.random_access()?;
+        let mut head = vec![0; access.length().min(HEAD_BYTES as u64) as usize];
+        access.read_at(&mut head, 0, progress).map_err(Halt::Io)?;
+        match misnamed(&head, access.length(), Some(self.format)) {
+            Some(fault) => Err(fault.into()),
+            None => Ok(()),
         }
     }
 
@@ -232,7 +263,11 @@ impl<'scope, 'env> Opener<'scope, 'env> {
         let length = reader.length;
         #[cfg(not(target_family = "wasm"))]
         let reader = ReadAhead::start(self.scope, reader);
-        Ok(ByteReader::new(reader, length))
+        let mut reader = ByteReader::new(reader, length);
+        match misnamed(reader.peek(HEAD_BYTES), length, Some(self.input.format)) {
+            Some(fault) => Err(fault.into()),
+            None => Ok(reader),
+        }
     }
 }
 

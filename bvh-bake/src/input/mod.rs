@@ -17,6 +17,7 @@ mod collect;
 mod frame;
 pub(crate) mod gather;
 pub(crate) mod gltf;
+mod head;
 mod indexed;
 mod input_file;
 pub mod mesh;
@@ -36,6 +37,7 @@ mod xyz;
 use crate::error::BakeError;
 use crate::error::{Fault, Halt, excerpt};
 pub use crate::error::{Place, ReadError};
+use crate::options::Options;
 use crate::progress::{Progress, WHOLE};
 use crate::storage::resources::{Allowance, Resources};
 pub(crate) use checksums::Checksums;
@@ -75,6 +77,34 @@ const KNOWN: &str =
     "a mesh in a file named .obj, .stl, .ply, .gltf, .glb or .dae, or points in one named .xyz, .pcd or .ply";
 
 impl MeshFormat {
+    /// Returns the name of the format, such as `OBJ`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            MeshFormat::Obj => "OBJ",
+            MeshFormat::Stl => "STL",
+            MeshFormat::Ply => "PLY",
+            MeshFormat::Gltf => "glTF",
+            MeshFormat::Collada => "COLLADA",
+            MeshFormat::Xyz => "XYZ",
+            MeshFormat::Pcd => "PCD",
+        }
+    }
+
+    /// Returns the format of a file: that of its extension or, if the extension is unknown or missing, the one that its bytes
+    /// suggest.
+    ///
+    /// # Errors
+    /// [`ReadError::Invalid`] if neither is known. It names what the file holds instead, if its first bytes tell.
+    pub fn of_file(path: &Path, bytes: &[u8]) -> Result<MeshFormat, ReadError> {
+        Self::of_head(path, bytes, bytes.len() as u64)
+    }
+
+    /// Returns the format of a file of `length` bytes. 4096 of its first bytes are enough.
+    pub(crate) fn of_head(path: &Path, head: &[u8], length: u64) -> Result<MeshFormat, ReadError> {
+        let known = Self::from_extension(path).or_else(|| Self::from_head(head, length));
+        known.ok_or_else(|| unknown_format(path, head, length))
+    }
+
     /// Returns the format that the extension of a file's name stands for, in upper or lower case.
     pub fn from_extension(path: &Path) -> Option<MeshFormat> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
@@ -166,7 +196,21 @@ pub fn read_scene(path: &Path) -> Result<Mesh, ReadError> {
 /// # Errors
 /// The errors of [`read`].
 pub fn read_bytes(bytes: &[u8], format: MeshFormat, source: &Path) -> Result<Mesh, ReadError> {
-    collect(&InputFile::of_bytes(bytes, format, source))
+    read_bytes_with(bytes, format, source, &Options::default())
+}
+
+/// Reads a mesh from the bytes of a file as [`read_bytes`] does, with those options that concern reading: `scene` and
+/// `drop_nan`.
+///
+/// # Errors
+/// The errors of [`read`].
+pub fn read_bytes_with(
+    bytes: &[u8],
+    format: MeshFormat,
+    source: &Path,
+    options: &Options,
+) -> Result<Mesh, ReadError> {
+    collect(&InputFile::of_bytes(bytes, format, source).with_options(options))
 }
 
 /// Finds a file that may take as much memory as there is.
@@ -192,7 +236,9 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
         read.and_then(|_| found.finish(input)).and_then(|()| found.into_mesh())
     } else if input.format() == MeshFormat::Gltf {
         let mut found = gltf::InMemory::default();
-        let read = gltf::read(input, &input.random_access()?, &mut found, Allowance::UNLIMITED, progress);
+        let read = input.look(progress).and_then(|()| {
+            gltf::read(input, &input.random_access()?, &mut found, Allowance::UNLIMITED, progress)
+        });
         read.map(|_| found.mesh)
     } else {
         thread::scope(|scope| {
@@ -204,19 +250,19 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
             match input.format() {
                 MeshFormat::Stl => stl::read_mesh(open(true)?, input.warnings()),
                 MeshFormat::Ply => {
-                    ply::read(open, &mut faces)?;
+                    ply::read(open, &mut faces, input)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 MeshFormat::Xyz => {
-                    xyz::read(open(true)?, &mut faces)?;
+                    xyz::read(open(true)?, &mut faces, input)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 MeshFormat::Pcd => {
-                    pcd::read(open(true)?, &mut faces, &resources)?;
+                    pcd::read(open(true)?, &mut faces, input, &resources)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 _ => {
-                    let names = obj::read(open, &mut faces, &resources)?;
+                    let names = obj::read(open, &mut faces, input.warnings(), &resources)?;
                     mesh_of_faces(&faces, &names)
                 }
             }
@@ -237,8 +283,11 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
     Ok(mesh)
 }
 
-/// Returns the error for a file of no known format.
-pub(crate) fn unknown_format(path: &Path) -> ReadError {
+/// Returns the error for a file of no known format, given its length and its first bytes.
+fn unknown_format(path: &Path, head: &[u8], length: u64) -> ReadError {
+    if let Some(fault) = head::misnamed(head, length, None) {
+        return fault.in_file(path);
+    }
     let found = match path.extension() {
         Some(extension) => format!("an unsupported format, .{}", excerpt(extension.as_encoded_bytes())),
         None => "content of no known format".to_owned(),
@@ -290,6 +339,14 @@ fn next_ids(next: &mut u32, count: usize) -> Result<Vec<u32>, Fault> {
 
 /// The requirement for a coordinate, as messages state it.
 pub(crate) const COORDINATE: &str = "a finite coordinate of at most 2^120 in magnitude";
+
+/// Returns how a message states a coordinate that the format cannot hold. A point may lack a position, which has a remedy.
+fn misfit(value: f64, of_point: bool) -> String {
+    match of_point && !value.is_finite() {
+        true => format!("{value:e}; --drop-nan (drop_nan) leaves out points without a position"),
+        false => format!("{value:e}"),
+    }
+}
 
 /// Returns the fault of a file that was malformed at the first reading but not at the second.
 fn changed_meanwhile() -> Fault {

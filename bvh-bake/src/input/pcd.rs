@@ -5,8 +5,9 @@
 
 use super::byte_reader::{ByteReader, Words};
 use super::indexed::IndexedFaces;
-use super::text::{number, words as words_of};
-use super::xyz::{add, finish};
+use super::input_file::InputFile;
+use super::text::{has_decimal_comma, number, words as words_of, wrong_number};
+use super::xyz::Points;
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::limits::MAX_TRIANGLES;
 use crate::storage::resources::Resources;
@@ -76,16 +77,30 @@ struct Header {
 pub(super) fn read<R: Read>(
     reader: ByteReader<R>,
     faces: &mut IndexedFaces,
+    input: &InputFile,
     resources: &Resources,
 ) -> Result<(), Halt> {
     let mut words = Words::new(reader);
+    let mut points = Points::new(faces, input);
     let result = Header::read(&mut words).map_err(Halt::from).and_then(|header| match header.data {
-        Data::Text => header.read_text(&mut words, faces),
-        Data::Binary => header.read_binary(&mut words.reader, faces),
-        Data::Compressed => header.read_compressed(&mut words.reader, faces, resources),
+        Data::Text => header.read_text(&mut words, &mut points).map(|()| words.place()),
+        Data::Binary => {
+            header.read_binary(&mut words.reader, &mut points)?;
+            Ok(Place::Byte(words.reader.position()))
+        }
+        Data::Compressed => {
+            header.read_compressed(&mut words.reader, &mut points, resources)?;
+            Ok(Place::Byte(words.reader.position()))
+        }
     });
+    if let Ok(place) = &result {
+        let rest = words.reader.take_rest();
+        if rest > 0 {
+            input.warnings().add(*place, format!("left out {rest} bytes after the last point"));
+        }
+    }
     words.reader.finish(result)?;
-    finish(faces)
+    points.finish()
 }
 
 impl Header {
@@ -188,31 +203,36 @@ impl Header {
         })
     }
 
-    fn read_text<R: Read>(&self, words: &mut Words<R>, faces: &mut IndexedFaces) -> Result<(), Halt> {
+    fn read_text<R: Read>(&self, words: &mut Words<R>, points: &mut Points) -> Result<(), Halt> {
         let count = self.fields.iter().map(|field| field.count).sum::<usize>();
         let axes = self.axes(|field| field.count);
-        for _ in 0..self.points {
+        while points.count() < self.points {
             let Some((line, _)) = words.line() else {
                 let expected = format!("{} points", self.points);
                 return Err(Fault::new(
                     words.place(),
                     expected,
-                    format!("{} and the end of the file", faces.vertex_count()),
+                    format!("{} and the end of the file", points.count()),
                 )
                 .into());
             };
             let numbers: Vec<&[u8]> = words_of(&line).take(count + 1).collect();
+            if numbers.is_empty() {
+                continue;
+            }
             let [x, y, z] = axes.map(|(_, place)| numbers.get(place).and_then(|word| number(word)));
             let (Some(x), Some(y), Some(z), true) = (x, y, z, numbers.len() == count) else {
                 let expected = format!("a point: {count} numbers, as FIELDS and COUNT state");
-                return Err(Fault::new(words.place(), expected, excerpt(&line)).into());
+                let wrong = numbers.iter().find(|word| has_decimal_comma(word));
+                let found = wrong.map_or_else(|| excerpt(&line), |word| wrong_number(word));
+                return Err(Fault::new(words.place(), expected, found).into());
             };
-            add(faces, [x, y, z], words.place())?;
+            points.add([x, y, z], words.place())?;
         }
         Ok(())
     }
 
-    fn read_binary<R: Read>(&self, reader: &mut ByteReader<R>, faces: &mut IndexedFaces) -> Result<(), Halt> {
+    fn read_binary<R: Read>(&self, reader: &mut ByteReader<R>, points: &mut Points) -> Result<(), Halt> {
         let (bytes, axes) = (self.point_bytes(), self.axes(Field::bytes));
         self.expect_room(reader, reader.bytes_left() / bytes as u64)?;
         for _ in 0..self.points {
@@ -223,7 +243,7 @@ impl Header {
             let (Some(x), Some(y), Some(z)) = (x, y, z) else {
                 return Err(Fault::new(place, "a point", "the end of the file").into());
             };
-            add(faces, [x, y, z], place)?;
+            points.add([x, y, z], place)?;
             reader.skip(bytes);
         }
         Ok(())
@@ -232,7 +252,7 @@ impl Header {
     fn read_compressed<R: Read>(
         &self,
         reader: &mut ByteReader<R>,
-        faces: &mut IndexedFaces,
+        points: &mut Points,
         resources: &Resources,
     ) -> Result<(), Halt> {
         let place = Place::Byte(reader.position());
@@ -248,16 +268,17 @@ impl Header {
         resources.keep(packed + whole)?;
         let data = expand(reader.peek(packed as usize), whole as usize);
         let data = data.ok_or_else(|| Fault::new(place, format!("LZF data of {whole} bytes"), "others"))?;
-        let points = self.points as usize;
+        reader.skip(packed as usize);
+        let count = self.points as usize;
         // The values of a field follow each other.
-        let axes = self.axes(Field::bytes).map(|(kind, at)| (kind, at * points));
-        for number in 0..points {
+        let axes = self.axes(Field::bytes).map(|(kind, at)| (kind, at * count));
+        for number in 0..count {
             let value = |(kind, at): (Kind, usize)| kind.number(data.get(at + number * kind.bytes..)?);
             let [x, y, z] = axes.map(value);
             let (Some(x), Some(y), Some(z)) = (x, y, z) else {
                 return Err(Fault::new(place, "all values of a field", "the end of the data").into());
             };
-            add(faces, [x, y, z], place)?;
+            points.add([x, y, z], place)?;
         }
         Ok(())
     }

@@ -1,21 +1,35 @@
 //! Reads PLY: text, or binary of either byte order, with any elements and properties in any order.
 //!
 //! The reader needs `x`, `y` and `z` of the element `vertex` and the list `vertex_indices` (or `vertex_index`) of the
-//! element `face`. It reads and drops the rest. In a file without lists and without an element `face`, vertices are points,
-//! which become triangles whose corners are equal. All numbers are read as f64, which represents numbers of every type
-//! exactly. Text is read word by word, wherever its lines end. Bytes after the last element are ignored.
+//! elements `face` and `tristrips`. It reads and drops the rest. Without these elements and without lists, vertices are points,
+//! which become triangles whose corners are equal; so are those of a `range_grid`. Faces of fewer than three corners are left out
+//! and counted. All numbers are read as f64, which represents numbers of every type exactly, but for integers of 64 bits above
+//! 2^53, which are rounded.
+//!
+//! Text is read word by word, wherever its lines end. Words after the last element are an error, because each row may then have
+//! more numbers than the header declares, and all of them belong elsewhere. In a binary file, they are left out with a warning.
 
 use super::byte_reader::{ByteReader, Words};
 use super::indexed::IndexedFaces;
+use super::input_file::InputFile;
 use super::polygon::MAX_CORNERS;
-use super::text::words;
-use super::{COORDINATE, changed_meanwhile};
+use super::text::{is_filler, words};
+use super::warnings::{LeftOut, tell_short_faces};
+use super::xyz::tell_dropped;
+use super::{COORDINATE, changed_meanwhile, misfit};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES, coordinate_fits};
 use std::io::Read;
 
 /// The most elements and properties of a header, which are kept in memory.
 const MAX_DECLARED: u64 = 1 << 14;
+
+/// The elements that make triangles.
+const FACES: [&str; 2] = ["face", STRIPS];
+/// Strips of triangles, in each of which -1 starts another.
+const STRIPS: &str = "tristrips";
+/// The cells of an image of depths, each with the number of a vertex or none.
+const RANGE_GRID: &str = "range_grid";
 
 /// What becomes of the vertices and faces of a file, of which either may come first.
 enum Sink<'a> {
@@ -46,8 +60,9 @@ impl Sink<'_> {
 pub(crate) fn read<R: Read>(
     open: impl Fn(bool) -> Result<ByteReader<R>, Halt>,
     faces: &mut IndexedFaces,
+    input: &InputFile,
 ) -> Result<(), Halt> {
-    stream(open(true)?, Sink::Faces(faces))?;
+    stream(open(true)?, Sink::Faces(faces), input)?;
     faces.finish()?;
     if let Some((_, corner)) = faces.first_out_of_range()? {
         let expected = format!("vertex numbers below {}", faces.vertex_count());
@@ -57,27 +72,33 @@ pub(crate) fn read<R: Read>(
         None => Ok(()),
         Some((_, vertex)) => {
             // The second reading meets the misfit again and reports its place.
-            stream(open(false)?, Sink::MisfitOf(vertex.into()))?;
+            stream(open(false)?, Sink::MisfitOf(vertex.into()), input)?;
             Err(changed_meanwhile().into())
         }
     }
 }
 
 /// Reads a file from its beginning to its end.
-fn stream<R: Read>(reader: ByteReader<R>, sink: Sink<'_>) -> Result<(), Halt> {
+fn stream<R: Read>(reader: ByteReader<R>, sink: Sink<'_>, input: &InputFile) -> Result<(), Halt> {
     let mut words = Words::new(reader);
     let header = match Header::read(&mut words) {
         Ok(header) => header,
         Err(fault) => return words.reader.finish(Err(fault.into())),
     };
-    let format = header.format;
-    let mut body = Body { words, format };
-    let has_faces = header.elements.iter().any(|element| element.name == "face");
-    let mut reader = Reader { sink, corners: Vec::new(), vertices: 0, triangles: 0, has_faces };
+    let (format, end_of_header) = (header.format, words.place());
+    let mut body = Body { words, format, long_row: None };
+    let mut reader = Reader::new(sink, &header, input);
     let result = header.elements.iter().try_for_each(|element| {
         body.expect_room(element)?;
         reader.read_element(element, &mut body)
     });
+    let result = match format {
+        Format::Ascii => body.end_text(result, &header, end_of_header),
+        _ => result.map(|()| body.end_bytes(input)),
+    };
+    if result.is_ok() {
+        reader.tell(&header, end_of_header);
+    }
     body.words.reader.finish(result)
 }
 
@@ -89,6 +110,8 @@ enum Kind {
     U16,
     I32,
     U32,
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -102,6 +125,8 @@ impl Kind {
             b"ushort" | b"uint16" => Kind::U16,
             b"int" | b"int32" => Kind::I32,
             b"uint" | b"uint32" => Kind::U32,
+            b"int64" => Kind::I64,
+            b"uint64" => Kind::U64,
             b"float" | b"float32" => Kind::F32,
             b"double" | b"float64" => Kind::F64,
             _ => return None,
@@ -113,7 +138,7 @@ impl Kind {
             Kind::I8 | Kind::U8 => 1,
             Kind::I16 | Kind::U16 => 2,
             Kind::I32 | Kind::U32 | Kind::F32 => 4,
-            Kind::F64 => 8,
+            Kind::I64 | Kind::U64 | Kind::F64 => 8,
         }
     }
 }
@@ -145,6 +170,12 @@ struct Header {
 }
 
 impl Header {
+    /// Returns the number of rows of numbers.
+    fn rows(&self) -> u64 {
+        let has_numbers = |element: &&Element| !element.properties.is_empty();
+        self.elements.iter().filter(has_numbers).map(|element| element.count).fold(0, u64::saturating_add)
+    }
+
     fn read<R: Read>(words_of_file: &mut Words<R>) -> Result<Header, Fault> {
         let lines = words_of_file;
         let head = lines.reader.peek(16).to_vec();
@@ -198,20 +229,26 @@ impl Header {
             }
         };
         let format = format.ok_or_else(|| Fault::new(lines.place(), "a format above end_header", "none"))?;
-        for (name, roles) in [
-            ("vertex", &[Role::Coordinate(0), Role::Coordinate(1), Role::Coordinate(2)][..]),
-            ("face", &[Role::Corners]),
-        ] {
-            let element = elements.iter().find(|element| element.name == name);
-            let has = |role: &Role| element.is_some_and(|e| e.properties.iter().any(|p| p.role == *role));
-            // A file of points has no lists.
-            let has_list =
-                |element: &Element| element.properties.iter().any(|property| property.count.is_some());
-            let may_lack = name == "face" && element.is_none() && !elements.iter().any(has_list);
-            if !may_lack && !roles.iter().all(has) {
-                let expected = "an element vertex with x, y and z, and no element face or one with a list vertex_indices";
-                return Err(Fault::new(lines.place(), expected, format!("no such {name}")));
-            }
+        let has = |element: &Element, role| element.properties.iter().any(|property| property.role == role);
+        let is_vertex = |element: &&Element| {
+            element.name == "vertex" && [0, 1, 2].iter().all(|&axis| has(element, Role::Coordinate(axis)))
+        };
+        let makes_faces = |element: &&Element| FACES.contains(&&element.name[..]);
+        // A file of points has no lists but those of the cells of a grid.
+        let has_list = |element: &Element| {
+            element.name != RANGE_GRID && element.properties.iter().any(|property| property.count.is_some())
+        };
+        let has_faces = match elements.iter().any(|element| makes_faces(&element)) {
+            true => elements.iter().filter(makes_faces).all(|element| has(element, Role::Corners)),
+            false => !elements.iter().any(has_list),
+        };
+        let has_vertices =
+            elements.iter().find(|element| element.name == "vertex").is_some_and(|of| is_vertex(&of));
+        if let (false, _) | (_, false) = (has_vertices, has_faces) {
+            let expected =
+                "an element vertex with x, y and z, and no element face or one with a list vertex_indices";
+            let found = if has_vertices { "no such face" } else { "no such vertex" };
+            return Err(Fault::new(lines.place(), expected, found));
         }
         // If lines end in CR alone, an LF after the last CR belongs to the body.
         if format != Format::Ascii && only_returns && ended_by_both {
@@ -240,7 +277,7 @@ fn read_property(element: &str, words: &[&[u8]; 5]) -> Option<Property> {
         ("vertex", b"x", None) => Role::Coordinate(0),
         ("vertex", b"y", None) => Role::Coordinate(1),
         ("vertex", b"z", None) => Role::Coordinate(2),
-        ("face", b"vertex_indices" | b"vertex_index", Some(_)) => Role::Corners,
+        ("face" | "tristrips", b"vertex_indices" | b"vertex_index", Some(_)) => Role::Corners,
         _ => Role::Other,
     };
     Some(Property { count, kind: Kind::parse(kind)?, role }).filter(|_| !name.is_empty())
@@ -250,6 +287,8 @@ fn read_property(element: &str, words: &[&[u8]; 5]) -> Option<Property> {
 struct Body<R> {
     words: Words<R>,
     format: Format,
+    /// The fault of the first row of text that does not end with its line.
+    long_row: Option<Fault>,
 }
 
 impl<R: Read> Body<R> {
@@ -258,6 +297,75 @@ impl<R: Read> Body<R> {
         match self.format {
             Format::Ascii => self.words.place(),
             _ => Place::Byte(self.words.reader.position()),
+        }
+    }
+
+    /// Notes the first row of text that does not end with its line.
+    fn end_row(&mut self, element: &Element) {
+        if self.format != Format::Ascii || self.long_row.is_some() {
+            return;
+        }
+        if let Some(more) = self.words.more_on_line() {
+            let name = excerpt(element.name.as_bytes());
+            let expected = format!("a row of element {name} with as many numbers as the header declares");
+            let found =
+                format!("more, from {} on; declare them as properties", excerpt(self.words.text(more)));
+            self.long_row = Some(Fault::new(self.words.place(), expected, found));
+        }
+    }
+
+    /// Refuses words after the last element. Rows may have more numbers than the header declares, which shifts all others; the
+    /// first such row is then the fault, and not what the shift leads to.
+    fn end_text(
+        &mut self,
+        result: Result<(), Halt>,
+        header: &Header,
+        end_of_header: Place,
+    ) -> Result<(), Halt> {
+        let rest = match &result {
+            Ok(()) => self.next_no_filler(),
+            Err(Halt::Fault(Fault::Invalid { .. })) if self.long_row.is_some() => None,
+            Err(_) => return result,
+        };
+        if result.is_ok() && rest.is_none() {
+            return result;
+        }
+        let place = self.words.place();
+        if result.is_err() {
+            while self.words.next().is_some() {}
+            // Rows that share lines are shifted by nothing.
+            let (Place::Line(first), Place::Line(last)) = (end_of_header, self.words.place()) else {
+                return result;
+            };
+            if last - first < header.rows() {
+                return result;
+            }
+        }
+        let end = || {
+            let found = rest.clone().unwrap_or_default();
+            Fault::new(place, "the end of the file after the last row that the header declares", found)
+        };
+        Err(self.long_row.take().unwrap_or_else(end).into())
+    }
+
+    /// Returns the next word that does not fill up the file.
+    fn next_no_filler(&mut self) -> Option<String> {
+        loop {
+            let word = self.words.next()?;
+            let letters = self.words.text(word);
+            if !is_filler(letters) {
+                return Some(excerpt(letters));
+            }
+        }
+    }
+
+    /// Passes over what follows the last element, and warns of it.
+    fn end_bytes(&mut self, input: &InputFile) {
+        let (place, rest) = (self.place(), self.words.reader.take_rest());
+        if rest > 0 {
+            input
+                .warnings()
+                .add(place, format!("left out {rest} bytes after the last row that the header declares"));
         }
     }
 
@@ -296,6 +404,8 @@ impl<R: Read> Body<R> {
             Kind::U16 => self.take().map(|b| f64::from(u16::from_le_bytes(b))),
             Kind::I32 => self.take().map(|b| f64::from(i32::from_le_bytes(b))),
             Kind::U32 => self.take().map(|b| f64::from(u32::from_le_bytes(b))),
+            Kind::I64 => self.take().map(|b| i64::from_le_bytes(b) as f64),
+            Kind::U64 => self.take().map(|b| u64::from_le_bytes(b) as f64),
             Kind::F32 => self.take().map(|b| f64::from(f32::from_le_bytes(b))),
             Kind::F64 => self.take().map(f64::from_le_bytes),
         };
@@ -316,6 +426,11 @@ impl<R: Read> Body<R> {
     fn whole(&mut self, kind: Kind, most: u64, what: &'static str) -> Result<u32, Fault> {
         let before = self.place();
         let number = self.number(kind)?;
+        self.to_whole(number, most, what, before)
+    }
+
+    /// Returns a number that was read after a place as a whole number from 0 to `most`.
+    fn to_whole(&self, number: f64, most: u64, what: &'static str, before: Place) -> Result<u32, Fault> {
         if number >= 0.0 && number <= most as f64 && number.fract() == 0.0 {
             return Ok(number as u32);
         }
@@ -336,19 +451,42 @@ struct Reader<'a> {
     triangles: u64,
     /// Whether there is an element of faces. Without it, vertices are points.
     has_faces: bool,
+    input: &'a InputFile<'a>,
+    /// The faces of fewer than three corners, and the points without a position.
+    short: LeftOut,
+    dropped: LeftOut,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    fn new(sink: Sink<'a>, header: &Header, input: &'a InputFile<'a>) -> Self {
+        let has_faces = header.elements.iter().any(|element| FACES.contains(&&element.name[..]));
+        let (short, dropped) = (LeftOut::default(), LeftOut::default());
+        Self { sink, corners: Vec::new(), vertices: 0, triangles: 0, has_faces, input, short, dropped }
+    }
+
+    /// Warns of what was left out.
+    fn tell(&self, header: &Header, end_of_header: Place) {
+        tell_short_faces(&self.short, self.input.warnings());
+        tell_dropped(&self.dropped, self.input);
+        if !self.has_faces && header.elements.iter().any(|element| element.name == RANGE_GRID) {
+            let told = "read the points of a range_grid, and left out the surface between them";
+            self.input.warnings().add(end_of_header, told);
+        }
+    }
+
     fn read_element<R: Read>(&mut self, element: &Element, body: &mut Body<R>) -> Result<(), Halt> {
         if element.properties.is_empty() {
             return Ok(());
         }
-        let is_vertex = element.name == "vertex";
+        let (is_vertex, is_strip) = (element.name == "vertex", element.name == STRIPS);
         for _ in 0..element.count {
             let mut position = [0.0; 3];
             for property in &element.properties {
                 let place = body.place();
                 match (property.count, property.role) {
+                    (Some(count), Role::Corners) if is_strip => {
+                        self.read_strip(count, property.kind, body)?
+                    }
                     (Some(count), Role::Corners) => self.read_face(count, property.kind, body)?,
                     (Some(count), _) => {
                         for _ in 0..body.whole(count, u64::from(u32::MAX), "a length of a list")? {
@@ -362,7 +500,7 @@ impl Reader<'_> {
                             && matches!(self.sink, Sink::MisfitOf(vertex) if vertex == self.vertices)
                         {
                             let place = if body.format == Format::Ascii { body.place() } else { place };
-                            let found = format!("{:e}", position[axis]);
+                            let found = misfit(position[axis], !self.has_faces);
                             return Err(Fault::new(place, COORDINATE, found).into());
                         }
                     }
@@ -371,7 +509,11 @@ impl Reader<'_> {
                     }
                 }
             }
-            if is_vertex {
+            body.end_row(element);
+            let lacks_position = || position.iter().any(|coordinate| !coordinate.is_finite());
+            if is_vertex && !self.has_faces && self.input.drops_nan() && lacks_position() {
+                self.dropped.add(body.place());
+            } else if is_vertex {
                 if self.vertices == MAX_VERTICES {
                     let (place, most) = (body.place(), MAX_VERTICES);
                     return Err(Fault::Limit { place, most, what: "vertices" }.into());
@@ -392,24 +534,64 @@ impl Reader<'_> {
     }
 
     fn read_face<R: Read>(&mut self, count: Kind, kind: Kind, body: &mut Body<R>) -> Result<(), Halt> {
-        let place = body.place();
+        let before = body.place();
         let arity = body.whole(count, u64::from(u32::MAX), "a number of corners")?;
+        let place = if body.format == Format::Ascii { body.place() } else { before };
         if arity < 3 {
-            return Err(Fault::new(place, "a face of at least three vertices", arity.to_string()).into());
+            self.short.add(place);
+            for _ in 0..arity {
+                body.number(kind)?;
+            }
+            return Ok(());
         }
         if arity as usize > MAX_CORNERS {
             return Err(Fault::Limit { place, most: MAX_CORNERS as u64, what: "vertices in a face" }.into());
         }
-        self.triangles += u64::from(arity) - 2;
-        if self.triangles > MAX_TRIANGLES {
-            return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" }.into());
-        }
-        // If the vertices come first, a wrong number is reported at its place.
-        let last = if self.vertices > 0 { self.vertices - 1 } else { MAX_VERTICES - 1 };
+        self.count_triangles(u64::from(arity) - 2, place)?;
+        let last = self.last_vertex();
         self.corners.clear();
         for _ in 0..arity {
-            self.corners.push(body.whole(kind, last, "a vertex number")?);
+            self.corners.push(body.whole(kind, last, VERTEX)?);
         }
         self.sink.face(&self.corners)
     }
+
+    /// Reads strips of triangles. Each corner makes a triangle with the two before it, and every other one turns the other way.
+    fn read_strip<R: Read>(&mut self, count: Kind, kind: Kind, body: &mut Body<R>) -> Result<(), Halt> {
+        let last = self.last_vertex();
+        let (mut before, mut length) = ([0; 2], 0u32);
+        for _ in 0..body.whole(count, u64::from(u32::MAX), "a length of a list")? {
+            let place = body.place();
+            let number = body.number(kind)?;
+            if number == -1.0 {
+                length = 0;
+                continue;
+            }
+            let corner = body.to_whole(number, last, VERTEX, place)?;
+            let [a, b] = before;
+            let triangle = if length % 2 == 0 { [a, b, corner] } else { [b, a, corner] };
+            // Triangles without area join the parts of a strip, and are not part of the surface.
+            if length > 1 && a != b && b != corner && corner != a {
+                self.count_triangles(1, place)?;
+                self.sink.face(&triangle)?;
+            }
+            (before, length) = ([b, corner], length + 1);
+        }
+        Ok(())
+    }
+
+    fn count_triangles(&mut self, more: u64, place: Place) -> Result<(), Fault> {
+        self.triangles += more;
+        if self.triangles > MAX_TRIANGLES {
+            return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" });
+        }
+        Ok(())
+    }
+
+    /// Returns the largest number that a vertex may have. If the vertices come first, a wrong one is reported at its place.
+    fn last_vertex(&self) -> u64 {
+        if self.vertices > 0 { self.vertices - 1 } else { MAX_VERTICES - 1 }
+    }
 }
+
+const VERTEX: &str = "a vertex number";

@@ -2,11 +2,17 @@
 //!
 //! A line ends at LF, CR LF or a CR alone. Some files use CR alone, and the others never have a CR inside a line.
 
-use memchr::memchr2;
+use crate::error::excerpt;
+use memchr::{memchr, memchr2};
 
 /// Returns whether a byte is a blank, which separates words within a line.
 pub(crate) fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0b | 0x0c)
+}
+
+/// Returns whether a word only fills up a file: Ctrl-Z, which ends text on old systems, and NUL.
+pub(crate) fn is_filler(word: &[u8]) -> bool {
+    word.iter().all(|byte| [0, 0x1a].contains(byte))
 }
 
 /// Returns the words of a line.
@@ -14,12 +20,46 @@ pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|&byte| is_blank(byte)).filter(|word| !word.is_empty())
 }
 
-/// Reads a number as the nearest f64. NaN and infinity count as numbers here.
+/// Reads a number as the nearest f64. NaN and infinity count as numbers here, also as the libraries of C compilers write them.
 pub(crate) fn number(word: &[u8]) -> Option<f64> {
     match leading_decimal(word) {
         Some((value, length)) if length == word.len() => Some(value),
-        _ => std::str::from_utf8(word).ok()?.parse().ok(),
+        _ => {
+            let word = std::str::from_utf8(word).ok()?;
+            word.parse().ok().or_else(|| no_number(word))
+        }
     }
+}
+
+/// Reads `-nan(ind)`, `1.#QNAN`, `-1.#INF00` and their like.
+fn no_number(word: &str) -> Option<f64> {
+    let word = word.strip_prefix(['-', '+']).unwrap_or(word).to_ascii_lowercase();
+    let is_name =
+        |name: &str| name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+-_".contains(&byte));
+    if let Some(kind) = word.strip_prefix("nan(").and_then(|kind| kind.strip_suffix(')')) {
+        return is_name(kind).then_some(f64::NAN);
+    }
+    let kind = word.strip_prefix("1.#").filter(|kind| is_name(kind))?;
+    let is_nan = ["qnan", "snan", "ind"].iter().any(|name| kind.starts_with(name));
+    match kind.starts_with("inf") {
+        true => Some(f64::INFINITY),
+        false => is_nan.then_some(f64::NAN),
+    }
+}
+
+/// Quotes a word that is no number for a message, with the remedy if it has a decimal comma.
+pub(crate) fn wrong_number(word: &[u8]) -> String {
+    let remedy = if has_decimal_comma(word) { "; write a decimal point, not a comma" } else { "" };
+    format!("{}{remedy}", excerpt(word))
+}
+
+/// Returns whether a word would be a number if it had a point for its comma.
+pub(crate) fn has_decimal_comma(word: &[u8]) -> bool {
+    memchr(b',', word).is_some_and(|at| {
+        let mut with_point = word.to_vec();
+        with_point[at] = b'.';
+        number(&with_point).is_some()
+    })
 }
 
 /// The powers of ten that f64 holds exactly.
@@ -158,7 +198,17 @@ mod tests {
         for word in ["", ".", "-", "e5", "1e", "1.e", "--1", "1,5", "1..2", "0x1"] {
             assert_eq!(number(word.as_bytes()), None, "{word}");
         }
-        assert!(number(b"nan").is_some_and(f64::is_nan));
+        for word in ["nan", "-nan(ind)", "NAN(snan)", "1.#QNAN", "-1.#IND00", "1.#qnan0e+000"] {
+            assert!(number(word.as_bytes()).is_some_and(f64::is_nan), "{word}");
+        }
+        for word in ["inf", "1.#INF", "-1.#INF00"] {
+            assert!(number(word.as_bytes()).is_some_and(f64::is_infinite), "{word}");
+        }
+        for word in ["nan(", "nan()x", "1.#", "1.#x", "2.#INF", "1.#INF/"] {
+            assert_eq!(number(word.as_bytes()), None, "{word}");
+        }
+        assert_eq!(wrong_number(b"0,5"), "0,5; write a decimal point, not a comma");
+        assert_eq!(wrong_number(b"a,5"), "a,5");
     }
 
     #[test]

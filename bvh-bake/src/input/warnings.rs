@@ -23,3 +23,41 @@ impl Warnings {
         self.0.take().into_iter().map(line).collect()
     }
 }
+
+/// Counts the things of one kind that a reader leaves out.
+#[derive(Default)]
+pub(crate) struct LeftOut {
+    pub(crate) count: u64,
+    first: Option<Place>,
+}
+
+impl LeftOut {
+    /// Counts a thing at a place, which the warning names if it is the first.
+    pub(crate) fn add(&mut self, place: Place) {
+        self.add_all(1, place);
+    }
+
+    /// Counts things of which the first is at a place.
+    pub(crate) fn add_all(&mut self, count: u64, place: Place) {
+        self.count += count;
+        if count > 0 {
+            self.first.get_or_insert(place);
+        }
+    }
+
+    /// Warns of what was left out: "face" and "faces", say, and what is wrong with them.
+    pub(crate) fn tell(&self, warnings: &Warnings, [one, many]: [&str; 2], which: &str) {
+        match (self.count, self.first) {
+            (1, Some(place)) => warnings.add(place, format!("left out a {one} {which}")),
+            (count, Some(place)) => {
+                warnings.add(place, format!("left out {count} {many} {which}, of which this is the first"));
+            }
+            (_, None) => {}
+        }
+    }
+}
+
+/// Warns of the faces that have no triangle: points and lines.
+pub(crate) fn tell_short_faces(short: &LeftOut, warnings: &Warnings) {
+    short.tell(warnings, ["face", "faces"], "of fewer than three corners");
+}

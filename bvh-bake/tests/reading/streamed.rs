@@ -67,7 +67,7 @@ const DAE: &str = "<COLLADA>\n<asset><unit meter=\"0.5\"/></asset><library_geome
     <p>0 1 2\n0 1 2 3\n1 2</p></polylist><triangles><input semantic=\"VERTEX\" source=\"#v\"/><p>2 1 0</p></triangles></mesh></geometry>\n\
     </library_geometries><library_visual_scenes><visual_scene>\n<node name=\"a\"><instance_geometry url=\"#g\"/></node>\n\
     <node name=\"b\"><scale>-1 1 2</scale><instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes></COLLADA>\n";
-const XYZ: &str = "# points\n0 0 0\n1,.5,1e-3 255\n1 .5 1e-3\n";
+const XYZ: &str = "# points\n0 0 0\n1,.5,1e-3,255\n1 .5 1e-3\n";
 const PCD: &str = "VERSION .7\nFIELDS x i y z\nSIZE 4 2 8 4\nTYPE F U F F\nWIDTH 3\nHEIGHT 1\nDATA ascii\n\
     0 1 0 0\n1 2 .5 1e-3\n1 3 .5 1e-3\n";
 const PLY_POINTS: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
@@ -178,8 +178,7 @@ fn bad_files_are_told_alike() {
     {
         assert!(folder.compare("a.dae", DAE.replace(from, to).as_bytes()).is_err(), "{to}");
     }
-    for (from, to) in [("3 0 2 3", "3 0 2 4"), ("3 0 2 3", "3 0 2 5"), ("3 0 2 3", "2 0 2"), ("nan 5", "nan")]
-    {
+    for (from, to) in [("3 0 2 3", "3 0 2 4"), ("3 0 2 3", "3 0 2 5"), ("nan 5", "nan")] {
         assert!(folder.compare("a.ply", PLY.replace(from, to).as_bytes()).is_err(), "{to}");
     }
     let faces_first = PLY_FACES_FIRST.replace("1 1 0\n", "1 nan inf\n");

@@ -262,6 +262,11 @@ typedef struct cbvh_bake_options {
     int32_t solid;
     /* Lets glTF files name buffers outside their own folders, which is otherwise refused. Files only. */
     int32_t allow_outside;
+    /* Leaves out points without a position, those with a coordinate that is NaN or infinite, which are otherwise refused. Files
+     * only. */
+    int32_t drop_nan;
+    /* Must be 0. */
+    int32_t reserved;
 } cbvh_bake_options;
 
 /* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes

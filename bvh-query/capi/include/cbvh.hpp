@@ -250,6 +250,7 @@ struct BakeOptions {
     bool force = false;
     bool solid = false;
     bool allow_outside = false;
+    bool drop_nan = false;
     double radius = 0;
 
     /// The texts stay those of this object.
@@ -273,6 +274,7 @@ struct BakeOptions {
         options.force = force;
         options.solid = solid;
         options.allow_outside = allow_outside;
+        options.drop_nan = drop_nan;
         options.radius = radius;
         return options;
     }

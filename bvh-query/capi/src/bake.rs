@@ -74,11 +74,15 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
         .turning_slabs(!flag("options.no_turning_slabs", given.no_turning_slabs)?)
         .topology(!flag("options.no_topology", given.no_topology)?)
         .solid(flag("options.solid", given.solid)?)
+        .drop_nan(flag("options.drop_nan", given.drop_nan)?)
         .radius(given.radius);
     // SAFETY: as above.
     let scratch = optional(given.scratch, |folder| unsafe { path("options.scratch", folder) })?;
     let max_memory = Some(given.max_memory).filter(|&bytes| bytes > 0);
     let force = flag("options.force", given.force)?;
+    if given.reserved != 0 {
+        return Err(Failure::argument("options.reserved", "0", given.reserved));
+    }
     let allow_outside = flag("options.allow_outside", given.allow_outside)?;
     Ok(Choices { options, scratch, max_memory, force, allow_outside })
 }
@@ -111,6 +115,7 @@ pub unsafe extern "C" fn cbvh_bake(
         };
         for (name, is_set) in [
             ("scene", choices.options.scene),
+            ("drop_nan", choices.options.drop_nan),
             ("max_memory", choices.max_memory.is_some()),
             ("scratch", choices.scratch.is_some()),
             ("force", choices.force),

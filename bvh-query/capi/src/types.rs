@@ -68,6 +68,8 @@ structures! {
         force: i32,
         solid: i32,
         allow_outside: i32,
+        drop_nan: i32,
+        reserved: i32,
     }
     RobotChoices {
         size: usize,

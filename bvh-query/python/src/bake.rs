@@ -24,6 +24,7 @@ pub(crate) struct BakeOptions {
     topology: bool,
     radius: f64,
     solid: bool,
+    drop_nan: bool,
 }
 
 impl BakeOptions {
@@ -37,7 +38,8 @@ impl BakeOptions {
             .ids(self.ids)
             .topology(self.topology)
             .radius(self.radius)
-            .solid(self.solid);
+            .solid(self.solid)
+            .drop_nan(self.drop_nan);
         if let Some(name) = &self.profile {
             let profile = Profile::from_name(name);
             let known = Profile::ALL.map(Profile::name);

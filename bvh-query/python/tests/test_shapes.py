@@ -5,6 +5,8 @@ import os
 import pickle
 import tempfile
 import unittest
+import warnings
+from pathlib import Path
 
 import numpy as np
 
@@ -251,6 +253,23 @@ class Margins(unittest.TestCase):
                 (KeyError, "id", lambda: scene.set_margin(99, 1)),
             ],
         )
+
+
+class Files(unittest.TestCase):
+    def test_warnings_and_points_without_a_position(self):
+        with tempfile.TemporaryDirectory() as folder:
+            source, output = Path(folder) / "holes.xyz", Path(folder) / "holes.cbvh"
+            source.write_text("0 0 0\nnan nan nan\n1 0 0\n")
+            with self.assertRaisesRegex(cbvh.BakeError, "line 2: .*drop_nan"):
+                cbvh.bake_files(source, output)
+            with self.assertWarnsRegex(cbvh.BakeWarning, "holes.xyz: line 2: left out a point") as caught:
+                mesh = cbvh.bake_files(source, output, drop_nan=True)
+            self.assertEqual((mesh.triangle_count, caught.filename), (2, __file__))
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                cbvh.bake_files(source, output, drop_nan=True)  # which is up to date
+            with self.assertRaisesRegex(TypeError, "drop_nan"):
+                cbvh.bake_files(source, output, drop_nan="yes")
 
 
 if __name__ == "__main__":

@@ -42,6 +42,7 @@ fn options(given: &JsValue) -> Answer<Options> {
     }
     let flag = |name: &str| get(name).as_bool().unwrap_or(true);
     Ok(Options::default()
+        .drop_nan(get("dropNan").is_truthy())
         .profile(profile)
         .triangles(triangles)
         .effort(effort.unwrap_or_default())
@@ -90,15 +91,13 @@ pub fn bake(vertices: &Float64Array, faces: Option<Uint32Array>, options: &JsVal
 #[wasm_bindgen(js_name = bakeFile)]
 pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mesh, JsValue> {
     let (path, bytes) = (Path::new(name), bytes(file, name)?);
-    let format = MeshFormat::from_extension(path).or_else(|| MeshFormat::from_content(&bytes));
-    let format = format.ok_or_else(|| {
-        wrong(
-            name,
-            "expected a mesh in a file named .obj, .stl, .ply, .glb or .dae, or points in one named .xyz or .pcd, found content of no known format",
-        )
-    })?;
-    let mesh = input::read_bytes(&bytes, format, path).map_err(refused)?;
+    let format = MeshFormat::of_file(path, &bytes).map_err(refused)?;
+    let mesh = input::read_bytes_with(&bytes, format, path, &self::options(options)?).map_err(refused)?;
     // The bake does not need the file.
     drop(bytes);
+    let told = Reflect::get(options, &"onWarning".into()).ok().and_then(|told| told.dyn_into::<Function>().ok());
+    for warning in told.iter().flat_map(|told| mesh.warnings.iter().map(move |warning| (told, warning))) {
+        warning.0.call1(&JsValue::UNDEFINED, &warning.1.into())?;
+    }
     bake_mesh(&mesh, options)
 }

@@ -481,7 +481,7 @@ export const cases = {
         );
         ok(/^robot\.stl: /.test(refused(() => cbvh.Mesh.bakeFile("robot.stl", new Uint8Array(90)))), "the file");
         ok(
-            /found content of no known format/.test(refused(() => cbvh.Mesh.bakeFile("robot.abc", new Uint8Array(9)))),
+            /found an unsupported format, \.abc/.test(refused(() => cbvh.Mesh.bakeFile("robot.abc", new Uint8Array(9)))),
             "the format",
         );
         const outside = { asset: { version: "2.0" }, buffers: [{ byteLength: 36, uri: "beside.bin" }] };
@@ -519,6 +519,10 @@ export const cases = {
         equal([thick.radius, thick.isSolid], [0.25, true]);
         equal(thick.distance(bake({}), cbvh.pose([3, 0, 0])).distance, 0.75);
         ok(/2\^118/.test(refused(() => bake({ radius: -1 }))), "radii");
+        const warnings = [];
+        const given = { dropNan: true, onWarning: (warning) => warnings.push(warning) };
+        const holes = cbvh.Mesh.bakeFile("holes.xyz", new TextEncoder().encode("0 0 0\nnan nan nan\n3 0 0\n"), given);
+        equal([holes.triangleCount, warnings], [2, ["holes.xyz: line 2: left out a point without a position"]]);
         const dots = cbvh.Mesh.bakeFile("dots.xyz", new TextEncoder().encode("0 0 0\n3 0 0\n3 0 0\n"), { radius: 1 });
         equal([dots.triangleCount, dots.radius], [3, 1]);
         const open = bake({ topology: false });

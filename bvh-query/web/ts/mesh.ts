@@ -54,6 +54,11 @@ export interface BakeOptions {
     radius?: number;
     /** Whether the mesh is solid, as by `solid`, which the file then states. False by default. */
     solid?: boolean;
+    /** Whether a file's points without a position are left out, those with a coordinate that is NaN or infinite. They are
+     * refused by default. */
+    dropNan?: boolean;
+    /** A function that is called with each warning: what the reader of a file did that its author may not expect. */
+    onWarning?: (warning: string) => void;
     /** A function that is called with the name of each stage when the stage begins. */
     onStage?: (stage: string) => void;
 }
@@ -125,6 +130,8 @@ function checked(options: BakeOptions): BakeOptions {
         ["topology", "boolean"],
         ["radius", "number"],
         ["solid", "boolean"],
+        ["dropNan", "boolean"],
+        ["onWarning", "function"],
         ["onStage", "function"],
     ];
     for (const [name, type] of types) {

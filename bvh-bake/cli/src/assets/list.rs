@@ -130,6 +130,7 @@ struct Line {
     effort: Option<String>,
     split_objects: Option<bool>,
     scene: Option<bool>,
+    drop_nan: Option<bool>,
     ids: Option<bool>,
     topology: Option<bool>,
     radius: Option<f64>,
@@ -196,6 +197,7 @@ impl Line {
         }
         options.split_objects = self.split_objects.unwrap_or(options.split_objects);
         options.scene = self.scene.unwrap_or(options.scene);
+        options.drop_nan = self.drop_nan.unwrap_or(options.drop_nan);
         options.ids = self.ids.unwrap_or(options.ids);
         options.topology = self.topology.unwrap_or(options.topology);
         options.radius = self.radius.unwrap_or(options.radius);

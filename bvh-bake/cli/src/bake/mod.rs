@@ -85,6 +85,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         .effort(arguments.effort)
         .split_objects(arguments.split_objects)
         .scene(arguments.scene)
+        .drop_nan(arguments.drop_nan)
         .ids(!arguments.no_ids)
         .topology(!arguments.no_topology)
         .radius(arguments.radius)
@@ -142,7 +143,8 @@ hundredth of the diagonal of the object's box; an error that is large for the me
 Warnings on standard error, and in the field warnings of --json, say what a reader did that the author of a file may not \
 expect, such as bytes that it left out.
 
-An XYZ file has a point per line; what follows its three numbers is ignored. Each point becomes a triangle whose corners are \
+An XYZ file has a point per line; what follows its three numbers is ignored. A line with the number of points and one with \
+the names of the columns may come first. Each point becomes a triangle whose corners are \
 equal, and points that coincide all stay. --radius and --solid are kept in the file, and every question respects them.
 
 A COLLADA file is scaled to metres and turned so that z points up, by the unit and the axis that it declares. What is \
@@ -172,7 +174,7 @@ Many assets:
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
-profile, triangles, max_error, effort, split_objects, scene, ids, topology, radius and solid; the options on the command line are their \
+profile, triangles, max_error, effort, split_objects, scene, drop_nan, ids, topology, radius and solid; the options on the command line are their \
 defaults. Paths are relative to the manifest and may lead anywhere. Inputs must be regular files, so that the command never \
 waits for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
@@ -236,6 +238,9 @@ pub(crate) struct BakeArguments {
     /// Bake a scene, with one tree per object: the nodes of glTF and COLLADA files become instances that share their meshes
     #[arg(long)]
     pub(crate) scene: bool,
+    /// Leave out points without a position, those with a coordinate that is nan or infinite, which are otherwise refused
+    #[arg(long)]
+    pub(crate) drop_nan: bool,
     /// Give the mesh a radius, in mesh units: it stands for all points this near to it, as each point of a cloud does for a ball
     #[arg(long, value_name = "LENGTH", default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) radius: f64,

@@ -95,7 +95,7 @@ impl Report {
             bake_seconds: baked.map(|baked| baked.seconds),
             seconds: self.seconds,
             warning: self.coarseness,
-            warnings: self.warnings(),
+            warnings: baked.map(|_| self.warnings()),
             stage_seconds: baked.map(|_| stages.collect::<BTreeMap<_, _>>()),
             // Bytes read from all files: the sum of the next three fields.
             bytes_read: traffic.map(|traffic| traffic.read()),

@@ -404,3 +404,43 @@ fn collada_becomes_metres_with_z_up_and_says_so() {
         &["parts/box.dae: line 2: expected an element that this reader knows, found <instance_controller>"],
     );
 }
+
+#[test]
+fn warnings_are_told_and_points_without_a_position_left_out() {
+    let directory = &place();
+    directory.write("holes.xyz", "2\n0 0 0\nnan nan nan\n1 0 0\n");
+    let bake = ["bake", "holes.xyz", "-o", "holes.cbvh", "--force"];
+    let refused = cbvh_in(directory, &bake);
+    refused.failed(3, &["holes.xyz: line 3: expected a finite coordinate", "--drop-nan"]);
+    let warnings = [
+        "holes.xyz: line 1: 3 points follow this line, which states 2",
+        "holes.xyz: line 3: left out a point without a position",
+    ];
+    let lines = warnings.map(|warning| format!("cbvh: warning: {warning}\n")).concat();
+    for quiet in [&[][..], &["-q"]] {
+        let told = cbvh_in(directory, &[&bake[..], &["--drop-nan"], quiet].concat());
+        assert_eq!((told.code, told.err), (0, lines.clone()));
+    }
+    let baked = cbvh_in(directory, &[&bake[..], &["--drop-nan", "--json"]].concat());
+    let json = baked.json();
+    assert_eq!(
+        (&json["warnings"], &json["triangles"]),
+        (&serde_json::json!(warnings), &serde_json::json!(2))
+    );
+    assert!(
+        warnings.iter().all(|warning| baked.err.contains(&format!("{{\"warning\":{warning:?}}}\n"))),
+        "{}",
+        baked.err
+    );
+    cbvh_in(directory, &["verify", "holes.cbvh", "holes.xyz"]).done();
+    directory.write("in.jsonl", r#"{"input": "holes.xyz", "output": "a.cbvh", "drop_nan": true}"#);
+    let many = cbvh_in(directory, &["bake", "--manifest", "in.jsonl", "--out-manifest", "out.jsonl"]);
+    assert!(many.err.contains(&lines), "{}", many.err);
+    let line = fs::read_to_string(directory.join("out.jsonl")).unwrap();
+    let line: serde_json::Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(line["warnings"], serde_json::json!(warnings));
+    // Meshes that are baked in memory are told of, too.
+    directory.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n");
+    let asked = cbvh_in(directory, &["query", "a.obj", "a.cbvh", "--mode", "collide"]);
+    assert_eq!(asked.err, "cbvh: warning: a.obj: line 4: left out a face of fewer than three corners\n");
+}

@@ -190,6 +190,8 @@ pub fn verify_files(
     for mesh in meshes {
         let input = InputFile::find(mesh, resources.document.less(taken), &resources.progress)
             .map_err(|halt| halt.in_file(mesh))?;
+        // A bake has refused points without a position, or left them out.
+        let input = input.drop_nan(true);
         let input = input.for_scene(layout.has_instances()).allow_outside(options.allow_outside);
         taken += input.bytes_in_memory();
         gatherer.read(&input)?;

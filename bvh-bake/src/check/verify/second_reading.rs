@@ -100,6 +100,8 @@ fn is_read_alike(text: &[u8]) -> bool {
             Some(b"v") => matches!(words.count(), 3 | 6),
             // Lines are faces to `tobj`.
             Some(b"fo" | b"l") => false,
+            // It keeps faces of fewer corners.
+            Some(b"f") => words.count() > 2,
             _ => true,
         };
         numbers_fit && !line.ends_with(b"\\") && !line.contains(&b'\r')
@@ -128,6 +130,7 @@ mod tests {
             "v 0 0 0\rv 0 0 0\n",
             "fo 1 2 3\n",
             "l 1 2 3\n",
+            "f 1 2\n",
             "f 1 2 9\n",
             "o \u{e9}\n",
         ] {

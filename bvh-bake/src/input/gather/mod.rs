@@ -170,16 +170,20 @@ impl<'a> Gatherer<'a> {
                 return stl::read(reader, &mut SolidsForBake::new(self), warnings);
             }
             MeshFormat::Ply => {
-                ply::read(open(PLY_BYTES), &mut faces)?;
+                ply::read(open(PLY_BYTES), &mut faces, opener.input)?;
                 (Names::unnamed(), WHOLE - PLY_BYTES)
             }
-            MeshFormat::Obj => (obj::read(open(OBJ_TEXT), &mut faces, self.resources)?, WHOLE - OBJ_TEXT),
+            MeshFormat::Obj => {
+                let warnings = opener.input.warnings();
+                let names = obj::read(open(OBJ_TEXT), &mut faces, warnings, self.resources)?;
+                (names, WHOLE - OBJ_TEXT)
+            }
             MeshFormat::Xyz => {
-                xyz::read(open(POINT_BYTES)(true)?, &mut faces)?;
+                xyz::read(open(POINT_BYTES)(true)?, &mut faces, opener.input)?;
                 (Names::unnamed(), WHOLE - POINT_BYTES)
             }
             MeshFormat::Pcd => {
-                pcd::read(open(POINT_BYTES)(true)?, &mut faces, self.resources)?;
+                pcd::read(open(POINT_BYTES)(true)?, &mut faces, opener.input, self.resources)?;
                 (Names::unnamed(), WHOLE - POINT_BYTES)
             }
             MeshFormat::Gltf | MeshFormat::Collada => unreachable!("these are no streams"),

@@ -1,7 +1,7 @@
 //! Reads the JSON of a glTF file, which is kept in memory as a whole, after it has been charged.
 
 use super::schema::{self, Document};
-use crate::error::{Fault, Halt, Place, excerpt};
+use crate::error::{Fault, Halt, Place, excerpt, sentence};
 use crate::input::input_file::{InputFile, RandomAccess};
 use crate::progress::Progress;
 use crate::storage::resources::{Allowance, READING_BYTES};
@@ -101,7 +101,7 @@ fn chunks(
 fn parse(text: &[u8], is_binary: bool) -> Result<Document, Fault> {
     let document: Document = serde_json::from_slice(text).map_err(|error| {
         let place = if is_binary { Place::File } else { Place::Line(error.line() as u64) };
-        Fault::new(place, "a glTF document", excerpt(error.to_string().as_bytes()))
+        Fault::new(place, "a glTF document", sentence(&error.to_string()))
     })?;
     let changes_triangles = |name: &str| {
         !["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"]

@@ -25,6 +25,11 @@ pub(super) struct Block {
     /// Positions in `corners`, each with the number of the vertex counted from the first vertex of the block.
     pub(super) relative: Vec<(usize, i64)>,
     pub(super) events: Vec<Event>,
+    /// The number of faces of fewer than three corners, and the line of the first, counted from 1 at the beginning of the block.
+    pub(super) short: u64,
+    pub(super) first_short: u64,
+    /// The number of lines.
+    pub(super) lines: u64,
     /// Whether a vertex is malformed. Nothing after it has been parsed.
     pub(super) has_wrong_vertex: bool,
     /// Whether a face is malformed. No face after it has been parsed, and `corners` ends before the first malformed
@@ -48,7 +53,15 @@ impl Block {
                     }
                 },
                 Keyword::Face if block.has_wrong_face => {}
-                Keyword::Face => block.has_wrong_face = block.face(operands).is_none(),
+                Keyword::Face => match block.face(operands) {
+                    Some(true) => {}
+                    Some(false) => {
+                        block.first_short =
+                            if block.short == 0 { statements.number } else { block.first_short };
+                        block.short += 1;
+                    }
+                    None => block.has_wrong_face = true,
+                },
                 Keyword::Group if has_objects => {}
                 Keyword::Object | Keyword::Group => {
                     let is_object = keyword == Keyword::Object;
@@ -57,11 +70,12 @@ impl Block {
                 }
             }
         }
+        block.lines = statements.line_number();
         block
     }
 
-    /// Adds a face, or returns `None` if it is malformed.
-    fn face(&mut self, operands: &[u8]) -> Option<()> {
+    /// Adds a face. Returns false if it has fewer than three corners, so that it is left out, and `None` if it is malformed.
+    fn face(&mut self, operands: &[u8]) -> Option<bool> {
         let first = self.corners.len();
         let mut at = 0;
         loop {
@@ -99,8 +113,14 @@ impl Block {
             }
         }
         let corners = self.corners.len() - first;
-        if !(3..=MAX_CORNERS).contains(&corners) {
+        if corners > MAX_CORNERS {
             return None;
+        }
+        if corners < 3 {
+            self.corners.truncate(first);
+            let kept = self.relative.partition_point(|&(place, _)| place < first);
+            self.relative.truncate(kept);
+            return Some(false);
         }
         let corners = corners as u32;
         match self.events.last_mut() {
@@ -109,7 +129,7 @@ impl Block {
             }
             _ => self.events.push(Event::Faces { corners, faces: 1 }),
         }
-        Some(())
+        Some(true)
     }
 }
 
@@ -153,13 +173,15 @@ mod tests {
 
     #[test]
     fn corners_end_where_a_face_is_wrong() {
-        for (text, corners) in
-            [("f 1 2 3\nf 1 0 1\nf 1 1 1", 4), ("f 1 2\n", 2), ("f 1 2 3 x", 3), ("f 1 99999999999 1", 1)]
+        for (text, corners) in [("f 1 2 3\nf 1 0 1\nf 1 1 1", 4), ("f 1 2 3 x", 3), ("f 1 99999999999 1", 1)]
         {
             let block = Block::parse(text.as_bytes());
             assert!(block.has_wrong_face, "{text}");
             assert_eq!(block.corners.len(), corners, "{text}");
         }
+        let block = Block::parse(b"f 1 2 3\n\nf 1 -2\nf -1 -2 -3\nf\n");
+        assert_eq!((block.short, block.first_short, block.lines), (2, 3, 5));
+        assert_eq!((block.corners.len(), block.relative.len(), block.has_wrong_face), (6, 3, false));
         let block = Block::parse(b"v 1 1 1\nv 1 x 1\nf 1 1 1");
         assert!(block.has_wrong_vertex && block.corners.is_empty());
     }

@@ -5,7 +5,7 @@
 //! the first error.
 
 use super::blocks::{TooLong, next_block};
-use super::statements::{Keyword, Statements, check_face, read_corner, read_vertex};
+use super::statements::{Index, Keyword, Statements, check_face, read_corner, read_vertex};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::byte_reader::ByteReader;
 use crate::input::text::{Lines, words};
@@ -43,12 +43,15 @@ fn find_in<R: Read>(open: impl Fn() -> Result<ByteReader<R>, Halt>) -> Result<()
             Keyword::Vertex => above += 1,
             Keyword::Face => {
                 let line = statements.number;
-                let mut corners = 0;
-                for word in words(statements.operands()).take_while(|word| word[0] != b'#') {
-                    read_corner(word, line, above, vertices)?;
-                    corners += 1;
+                let corners = || words(statements.operands()).take_while(|word| word[0] != b'#');
+                let count = corners().count() as u64;
+                for word in corners() {
+                    // A face of fewer corners is left out, whatever vertices it names.
+                    if count > 2 || !Index::is_valid(word) {
+                        read_corner(word, line, above, vertices)?;
+                    }
                 }
-                check_face(corners, line, &mut triangles)?;
+                check_face(count, line, &mut triangles)?;
             }
             Keyword::Object | Keyword::Group => {}
         }

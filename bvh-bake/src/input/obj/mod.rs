@@ -3,7 +3,7 @@
 //! The reader accepts any line ending, a byte order mark, `\` at the end of a `v` or `f` line, faces before their
 //! vertices, negative numbers that count back from the face, missing texture coordinates and normals, and statements
 //! that do not concern triangles. A vertex that is `nan` or beyond the range of f64 or of the format is an error only
-//! if a face uses it. Objects are named by `o`, or by `g` if the file has no `o`; all faces under one name form one
+//! if a face uses it. Faces of fewer than three corners are left out and counted. Objects are named by `o`, or by `g` if the file has no `o`; all faces under one name form one
 //! object.
 //!
 //! A face may use vertices that follow it, so that corners are checked after the whole file has been read. Only a
@@ -16,6 +16,7 @@ mod statements;
 
 use super::byte_reader::ByteReader;
 use super::indexed::IndexedFaces;
+use super::warnings::{LeftOut, Warnings, tell_short_faces};
 use crate::error::{Fault, Halt, Place};
 use crate::input::names::Names;
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
@@ -36,10 +37,12 @@ const BYTES_PER_NAME: u64 = 160;
 pub(crate) fn read<R: Read>(
     open: impl Fn(bool) -> Result<ByteReader<R>, Halt>,
     faces: &mut IndexedFaces,
+    warnings: &Warnings,
     resources: &Resources,
 ) -> Result<Names, Halt> {
-    let mut reading =
-        Reading { faces, names: Names::default(), resources, triangles: 0, has_wrong_face: false };
+    let names = Names::default();
+    let (triangles, lines, short, has_wrong_face) = (0, 0, LeftOut::default(), false);
+    let mut reading = Reading { faces, names, resources, triangles, lines, short, has_wrong_face };
     let mut reader = open(true)?;
     reader.skip_mark();
     let again = || open(false);
@@ -71,7 +74,7 @@ pub(crate) fn read<R: Read>(
         }
     }
     reader.finish(Ok(()))?;
-    let Reading { faces, names, triangles, has_wrong_face, .. } = reading;
+    let Reading { faces, names, triangles, short, has_wrong_face, .. } = reading;
     faces.finish()?;
     let out_of_range = faces.first_out_of_range()?.map(|(place, _)| place);
     // A vertex that the format cannot hold is an error at the first face that uses it, which comes before errors below.
@@ -81,8 +84,13 @@ pub(crate) fn read<R: Read>(
     if has_wrong_face || out_of_range.is_some() {
         return Err(faults::find(again));
     }
+    tell_short_faces(&short, warnings);
     if triangles == 0 {
-        return Err(Fault::new(Place::File, "at least one face", "none").into());
+        let found = match short.count {
+            0 => "none".to_owned(),
+            count => format!("none but {count} of fewer than three corners"),
+        };
+        return Err(Fault::new(Place::File, "at least one face", found).into());
     }
     Ok(names)
 }
@@ -93,6 +101,10 @@ struct Reading<'a> {
     names: Names,
     resources: &'a Resources,
     triangles: u64,
+    /// The number of lines.
+    lines: u64,
+    /// The faces of fewer than three corners.
+    short: LeftOut,
     has_wrong_face: bool,
 }
 
@@ -100,6 +112,8 @@ impl Reading<'_> {
     /// Adds a block. Returns false if the block has a malformed vertex or a vertex beyond the limit.
     fn add(&mut self, mut block: Block) -> Result<bool, Halt> {
         let above = self.faces.vertex_count();
+        self.short.add_all(block.short, Place::Line(self.lines + block.first_short));
+        self.lines += block.lines;
         self.faces.add_vertices(&block.vertices)?;
         if block.has_wrong_vertex || self.faces.vertex_count() > MAX_VERTICES {
             return Ok(false);

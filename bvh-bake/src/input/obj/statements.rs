@@ -2,7 +2,7 @@
 
 use crate::error::{Fault, Place, excerpt};
 use crate::input::polygon::MAX_CORNERS;
-use crate::input::text::{Lines, is_blank, number, words};
+use crate::input::text::{Lines, is_blank, number, words, wrong_number};
 use crate::limits::MAX_TRIANGLES;
 
 /// Reads the first three numbers after `v`. A fourth number is a weight or the first component of a colour.
@@ -15,7 +15,7 @@ pub(super) fn read_vertex(operands: &[u8], line: u64) -> Result<[f64; 3], Fault>
             return Err(Fault::new(Place::Line(line), EXPECTED, given.to_string()));
         };
         let value = number(word);
-        read[given] = value.ok_or_else(|| Fault::new(Place::Line(line), EXPECTED, excerpt(word)))?;
+        read[given] = value.ok_or_else(|| Fault::new(Place::Line(line), EXPECTED, wrong_number(word)))?;
     }
     Ok(read)
 }
@@ -41,13 +41,10 @@ pub(super) fn read_corner(word: &[u8], line: u64, above: u64, all: u64) -> Resul
 /// Checks the number of corners of a face, and adds the face's triangles to `triangles`, which it checks as well.
 pub(super) fn check_face(corners: u64, line: u64, triangles: &mut u64) -> Result<(), Fault> {
     let place = Place::Line(line);
-    if corners < 3 {
-        return Err(Fault::new(place, "a face of at least three vertices", corners.to_string()));
-    }
     if corners > MAX_CORNERS as u64 {
         return Err(Fault::Limit { place, most: MAX_CORNERS as u64, what: "vertices in a face" });
     }
-    *triangles += corners - 2;
+    *triangles += corners.saturating_sub(2);
     if *triangles > MAX_TRIANGLES {
         return Err(Fault::Limit { place, most: MAX_TRIANGLES, what: "triangles" });
     }
@@ -139,6 +136,8 @@ impl Index {
     pub(super) fn parse(word: &[u8]) -> Option<Self> {
         let end = word.iter().position(|&byte| byte == b'/').unwrap_or(word.len());
         let (digits, rest) = word.split_at(end);
+        // Some programs end a corner in one more slash.
+        let rest = rest.strip_suffix(b"/").unwrap_or(rest);
         let rest_is_numbers = rest.iter().all(|byte| matches!(byte, b'/' | b'-' | b'+' | b'0'..=b'9'));
         if !rest_is_numbers || rest.iter().filter(|&&byte| byte == b'/').count() > 2 {
             return None;
@@ -160,6 +159,11 @@ impl Index {
             number = number * 10 + i64::from(digit - b'0');
         }
         Some(Self(if negative { -number } else { number }))
+    }
+
+    /// Returns whether a word states a corner, though perhaps of no vertex of the file.
+    pub(super) fn is_valid(word: &[u8]) -> bool {
+        Self::parse(word).is_some_and(|index| index.0 != 0)
     }
 
     /// Returns the number of the vertex, counted from 0. `above` is the number of vertices above the face.

@@ -52,7 +52,7 @@ impl Leftover {
 
     /// Returns whether what is left is no multiple of the size of a triangle.
     pub(super) fn is_ragged(&self) -> bool {
-        self.bytes % TRIANGLE as u64 != 0
+        !self.bytes.is_multiple_of(TRIANGLE as u64)
     }
 
     /// Returns the warning about a file that may have a rest, after all of its bytes, or the fault of a mangled one.

@@ -4,11 +4,11 @@
 //! which they first appear. A file whose length is exactly what its binary count requires is binary even if it starts
 //! with `solid`, and so is a file with a zero byte near its start. Bytes after the last binary triangle are left out with a
 //! warning, because some exporters write them, unless they tell that the file is mangled (module `leftover`). A file that is shorter than its count requires, or text that ends inside a solid,
-//! is refused. Normals are ignored.
+//! is refused. In text, `end solid` and so on may be two words, and text without facets may follow the last solid. Normals are ignored.
 
 mod leftover;
 
-use super::byte_reader::{ByteReader, Words};
+use super::byte_reader::{ByteReader, Word, Words};
 use super::text::Lines;
 use super::warnings::Warnings;
 use super::{COORDINATE, next_ids, text};
@@ -18,6 +18,7 @@ use crate::limits::{MAX_VERTICES, coordinate_fits};
 use crate::threads::prelude::*;
 use crate::triangles::TRIANGLES_PER_PART;
 use leftover::Leftover;
+use memchr::memchr;
 use std::collections::HashMap;
 use std::io::Read;
 
@@ -65,7 +66,7 @@ pub(super) fn read<R: Read>(
     let head = reader.peek(TELLING);
     if is_ascii(head) && !is_exact_binary(head, length) {
         let mut words = Words::new(reader);
-        let result = read_ascii(&mut words, solids);
+        let result = read_ascii(&mut words, solids, warnings);
         words.reader.finish(result)
     } else {
         let result = read_binary(&mut reader, solids, warnings);
@@ -83,7 +84,20 @@ pub(super) fn is_exact_binary(head: &[u8], length: u64) -> bool {
 pub(super) fn is_ascii(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(TELLING)];
     let first = Lines::new(head).find_map(|line| text::words(line).next());
-    !head.contains(&0) && first.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+    let is_text = memchr(0, head).is_none_or(|end| ends_solid(&head[..end]));
+    is_text && first.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
+/// Returns whether some line of a text ends a solid, so that anything may follow to fill up the file.
+fn ends_solid(head: &[u8]) -> bool {
+    Lines::new(head).any(|line| {
+        let mut words = text::words(line).map(<[u8]>::to_ascii_lowercase);
+        match words.next().as_deref() {
+            Some(b"endsolid") => true,
+            Some(b"end") => words.next().as_deref() == Some(b"solid"),
+            _ => false,
+        }
+    })
 }
 
 fn binary_count(bytes: &[u8]) -> Option<u32> {
@@ -171,13 +185,20 @@ fn first_misfit(triangle: &[u8; TRIANGLE]) -> Option<(usize, f32)> {
     values.find(|&(_, value)| !coordinate_fits(value.into()))
 }
 
-fn read_ascii<R: Read>(words: &mut Words<R>, solids: &mut impl Solids) -> Result<(), Halt> {
+fn read_ascii<R: Read>(
+    words: &mut Words<R>,
+    solids: &mut impl Solids,
+    warnings: &Warnings,
+) -> Result<(), Halt> {
     const SOLID: &str = "facet or endsolid";
+    let mut has_solid = false;
     while let Some(word) = words.next() {
-        let word = words.text(word);
-        if !word.eq_ignore_ascii_case(b"solid") {
-            return Err(Fault::new(words.place(), "solid", excerpt(word)).into());
+        let text = words.text(word);
+        if !text.eq_ignore_ascii_case(b"solid") {
+            let fault = Fault::new(words.place(), "solid", excerpt(text));
+            return if has_solid { pass_over_rest(words, word, fault, warnings) } else { Err(fault.into()) };
         }
+        has_solid = true;
         let name = words.rest_of_line();
         let name = name.map(|name| String::from_utf8_lossy(words.text(name).trim_ascii()).into_owned());
         solids.begin(name.unwrap_or_default(), 0)?;
@@ -185,7 +206,10 @@ fn read_ascii<R: Read>(words: &mut Words<R>, solids: &mut impl Solids) -> Result
         loop {
             let word = words.expect(SOLID)?;
             let word = words.text(word);
-            if word.eq_ignore_ascii_case(b"endsolid") {
+            if word.eq_ignore_ascii_case(b"endsolid") || word.eq_ignore_ascii_case(b"end") {
+                if word.len() == 3 {
+                    keyword(words, "solid")?;
+                }
                 words.rest_of_line();
                 break;
             } else if !word.eq_ignore_ascii_case(b"facet") {
@@ -199,6 +223,28 @@ fn read_ascii<R: Read>(words: &mut Words<R>, solids: &mut impl Solids) -> Result
         }
         solids.triangles(batch.len(), |place| batch[place])?;
         solids.end()?;
+    }
+    Ok(())
+}
+
+/// Passes over what follows the last solid, which starts with a word, and warns of it unless it only fills up the file. Returns
+/// the fault if there are facets in it.
+fn pass_over_rest<R: Read>(
+    words: &mut Words<R>,
+    first: Word,
+    fault: Fault,
+    warnings: &Warnings,
+) -> Result<(), Halt> {
+    let (place, mut word, mut is_filler) = (words.place(), Some(first), true);
+    while let Some(letters) = word.map(|word| words.text(word)) {
+        if letters.eq_ignore_ascii_case(b"facet") || letters.eq_ignore_ascii_case(b"vertex") {
+            return Err(fault.into());
+        }
+        is_filler &= text::is_filler(letters);
+        word = words.next();
+    }
+    if !is_filler {
+        warnings.add(place, "left out the text after the last solid");
     }
     Ok(())
 }
@@ -235,11 +281,14 @@ fn read_facet<R: Read>(words: &mut Words<R>) -> Result<[[f64; 3]; 3], Fault> {
     Ok(corners)
 }
 
+/// Takes a keyword. One that starts with `end` may be two words.
 fn keyword<R: Read>(words: &mut Words<R>, expected: &'static str) -> Result<(), Fault> {
     let word = words.expect(expected)?;
     let word = words.text(word);
     if word.eq_ignore_ascii_case(expected.as_bytes()) {
         Ok(())
+    } else if let (true, Some(ended)) = (word.eq_ignore_ascii_case(b"end"), expected.strip_prefix("end")) {
+        keyword(words, ended)
     } else {
         Err(Fault::new(words.place(), expected, excerpt(word)))
     }

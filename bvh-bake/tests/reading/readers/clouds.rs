@@ -23,7 +23,7 @@ const THREE: [[f64; 3]; 3] = [[0.0, 0.5, -1.25], [1e3, 2.0, 3.0], [1e3, 2.0, 3.0
 fn xyz_has_a_point_per_line() {
     for text in [
         "0 .5 -1.25\n1e3 2 3\n1e3 2 3\n",
-        "\u{feff}# x y z\r\n\t0,0.5, -1.25 255 0 0\r\n\r\n// more\r\n1000;2;3;nan\r\n  1e3  2  3",
+        "\u{feff}# x y z\r\n\t0,\t0.5, -1.25 ,255\r\n\r\n// more\r\n1000;2;3;nan\r\n  1e3  2  3",
         "0 0.5 -1.25\r1e3 2 3\r1e3 2 3",
     ] {
         assert_eq!(points(&try_bytes(text.as_bytes(), MeshFormat::Xyz).unwrap()), THREE, "{text:?}");
@@ -34,7 +34,11 @@ fn xyz_has_a_point_per_line() {
         ("0 0 inf".to_owned(), format!("test: line 1: expected {finite}, found inf")),
         ("0 0 0\n1 2 -1e37".to_owned(), format!("test: line 2: expected {finite}, found -1")),
         ("0 0\n".to_owned(), "test: line 1: expected a point: three numbers, found 0 0".to_owned()),
-        ("12\nwater\n".to_owned(), "line 1: expected a point: three numbers, found 12".to_owned()),
+        (
+            "12\nwater\nO 0 0 0".to_owned(),
+            "line 3: expected a point: three numbers, found O 0 0 0".to_owned(),
+        ),
+        ("12 7\n0 0 0".to_owned(), "line 1: expected a point: three numbers, found 12 7".to_owned()),
         ("0 0 0\n1 2 z".to_owned(), "line 2: expected a point: three numbers, found 1 2 z".to_owned()),
         ("# none\n".to_owned(), "test: expected at least one point, found none".to_owned()),
     ] {

@@ -1,6 +1,7 @@
 //! Tests every reader, on small files that are written here and on a folder of malformed ones.
 
 mod any_bytes;
+mod as_found;
 mod clouds;
 mod collada;
 mod gltf;
@@ -104,7 +105,10 @@ fn obj_errors_name_the_line() {
     for (text, expected) in [
         ("v 0 0 0\nv 0 0\n", "test: line 2: expected three numbers after v, found 2"),
         ("v 0 0\\\n 0\n\nv 0 x 0\n", "test: line 4: expected three numbers after v, found x"),
-        ("v 0 0 0\r\rf 1 1", "test: line 3: expected a face of at least three vertices, found 2"),
+        (
+            "v 0 0 0\r\rf 1 1",
+            "test: expected at least one face, found none but 1 of fewer than three corners",
+        ),
         ("v 0 0 0\nf 1 0 1", "test: line 2: expected a vertex number from 1 to 1, found 0"),
         ("v 0 0 0\nf 1 1/x 1", "test: line 2: expected vertex numbers such as 7, 7/1 or 7//1, found 1/x"),
         (
@@ -289,7 +293,8 @@ fn ply_counts_are_checked_before_anything_is_read() {
         ),
         ("0 0 0 1 0 0 0 1 0 3 0 1 0.5", "found 0.5"),
         ("0 0 0 1 0 0 0 1 0 3 0 1 nan", "found NaN"),
-        ("0 0 0 1 0 0 0 1 0 2 0 1", "expected a face of at least three vertices, found 2"),
+        ("0 0 0 1 0 0 0 1 0 2 0 1", "expected at least one triangle, found none"),
+        ("0 0 0 1 0 0 0 1 0 2 0 x", "line 11: expected a number, found x"),
         ("0 0 0\n1 nan 0\n0 1 0\n3 0 1 2", "line 12: expected a finite coordinate"),
     ] {
         refused(format!("{header}{body}").as_bytes(), MeshFormat::Ply, expected);

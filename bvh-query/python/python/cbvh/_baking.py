@@ -27,11 +27,12 @@ def _options(
     topology: bool,
     radius: float,
     solid: bool,
+    drop_nan: bool = False,
 ) -> dict[str, Any]:
     for name, text in (("profile", profile), ("triangles", triangles), ("effort", effort)):
         if text is not None and not isinstance(text, str):
             raise TypeError(f"{name}: expected a str or None, found {type(text).__name__}")
-    for name, choice in (("ids", ids), ("topology", topology), ("solid", solid)):
+    for name, choice in (("ids", ids), ("topology", topology), ("solid", solid), ("drop_nan", drop_nan)):
         _bool(choice, name)
     if max_error is not None:
         if isinstance(max_error, (str, bytes)) or not hasattr(max_error, "__float__"):
@@ -54,6 +55,7 @@ def _options(
         "topology": bool(topology),
         "radius": float(radius),
         "solid": bool(solid),
+        "drop_nan": bool(drop_nan),
     }
 
 
@@ -117,13 +119,15 @@ def bake_files(
     topology: bool = True,
     radius: float = 0.0,
     solid: bool = False,
+    drop_nan: bool = False,
     max_memory: int | None = None,
     force: bool = False,
 ) -> Mesh:
     """Bakes mesh files (OBJ, STL, PLY, glTF, COLLADA) or points (XYZ, PCD, PLY) into a ``.cbvh`` file, and opens it.
 
     If the file is up to date, nothing is done, unless ``force``. ``max_memory``: the most bytes of memory; the rest
-    goes to scratch files, so a mesh may be larger than memory. The other options are those of `bake`. The environment
+    goes to scratch files, so a mesh may be larger than memory. ``drop_nan``: leaves out points without a position, those
+    with a coordinate that is NaN or infinite, which are otherwise refused. The other options are those of `bake`. The environment
     variable ``RAYON_NUM_THREADS`` sets the number of threads of the module, for bakes and for ``parallel=True``; the
     default is the number of cores. Warns with `BakeWarning` of what the readers did that the authors of the files may
     not expect, such as bytes or points that they left out. Raises OSError if the system refuses a file, and BakeError
@@ -136,7 +140,7 @@ def bake_files(
     files = [os.fsdecode(file) for file in inputs]
     if not files:
         raise ValueError("inputs: expected at least one file, found none")
-    options = _options(profile, triangles, max_error, effort, ids, topology, radius, solid)
+    options = _options(profile, triangles, max_error, effort, ids, topology, radius, solid, drop_nan)
     if max_memory is not None:
         try:
             max_memory = operator.index(max_memory)

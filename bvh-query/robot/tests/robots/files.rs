@@ -413,5 +413,5 @@ fn damaged_texts_never_panic() {
             }
         }
     }
-    assert!(read > 300 && refused > 300, "{read} read, {refused} refused");
+    assert!(read > 100 && refused > 1000, "{read} read, {refused} refused");
 }
