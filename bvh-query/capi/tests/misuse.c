@@ -275,7 +275,7 @@ static void bakes(void) {
     OPTION(scene, 1, "options.scene: expected nothing");
     OPTION(max_memory, 1, "options.max_memory: expected nothing");
     FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &(cbvh_bake_options){.size = 8}, &made), CBVH_INVALID_ARGUMENT,
-          "options.size: expected 96");
+          "options.size: expected 104");
     const char *missing = "/no such folder/x.obj";
     FAILS(cbvh_bake_files(&missing, 1, "/no such folder/x.cbvh", NULL, NULL), CBVH_SYSTEM, "x.obj");
     FAILS(cbvh_mesh_open("/no such folder/x.cbvh", CBVH_READ, &made), CBVH_SYSTEM, "x.cbvh");
@@ -375,7 +375,7 @@ static void shapes(void) {
         FAILS(cbvh_bake_ground(one, l, &made), CBVH_INVALID_ARGUMENT, "thickness: ");
         FAILS(cbvh_bake_cylinder(l, 1, 0.1, &number, &made), CBVH_INVALID_ARGUMENT, "radius: ");
         FAILS(cbvh_bake_cylinder(1, l, 0.1, &number, &made), CBVH_INVALID_ARGUMENT, "length: ");
-        FAILS(cbvh_bake_cylinder(1, 1, l, &number, &made), CBVH_INVALID_ARGUMENT, "most_error: ");
+        FAILS(cbvh_bake_cylinder(1, 1, l, &number, &made), CBVH_INVALID_ARGUMENT, "max_error: ");
         FAILS(cbvh_bake_cone(l, 1, 0.1, NULL, &made), CBVH_INVALID_ARGUMENT, "radius: ");
         FAILS(cbvh_bake_cone(1, l, 0.1, NULL, &made), CBVH_INVALID_ARGUMENT, "height: ");
         FAILS(cbvh_bake_voxels(cells, 1, l, &made), CBVH_INVALID_ARGUMENT, "side: ");
@@ -383,7 +383,7 @@ static void shapes(void) {
               "cell: expected a finite length");
         CHECK(made.id == 0);
     }
-    FAILS(cbvh_bake_cone(1, 1, 1e-12, NULL, &made), CBVH_INVALID_ARGUMENT, "most_error: expected an error for which");
+    FAILS(cbvh_bake_cone(1, 1, 1e-12, NULL, &made), CBVH_INVALID_ARGUMENT, "max_error: expected an error for which");
     const double endless[2] = {1, INFINITY};
     FAILS(cbvh_bake_ground(endless, 1, &made), CBVH_INVALID_ARGUMENT, "a half-space cannot be baked; make a ground");
     const double box_beyond[3] = {1e300, 1, 1};

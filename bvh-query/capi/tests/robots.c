@@ -6,6 +6,7 @@
 #include "support.h"
 #include <pthread.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define JOINTS 4
 #define LINKS 5
@@ -598,9 +599,10 @@ static void misuse(void) {
     FAILS(cbvh_robot_from_urdf(in(scratch, "away.urdf"), NULL, &made), CBVH_SYSTEM,
           "link a: expected the mesh package://p/x.stl, found none at");
     /* A mesh of another folder. */
-    char outside[2200];
-    snprintf(outside, sizeof outside, "<robot name=\"r\"><link name=\"a\"><collision><geometry><mesh filename=\"%s\"/>"
-        "</geometry></collision></link></robot>", in(testdata, "robot/base.obj"));
+    char outside[2200], folder[1000] = "";
+    CHECK(*testdata == '/' || getcwd(folder, sizeof folder) != NULL);
+    snprintf(outside, sizeof outside, "<robot name=\"r\"><link name=\"a\"><collision><geometry><mesh filename=\"%s/%s\"/>"
+        "</geometry></collision></link></robot>", folder, in(testdata, "robot/base.obj"));
     write_file(in(scratch, "outside.urdf"), outside);
     FAILS(cbvh_robot_from_urdf(in(scratch, "outside.urdf"), NULL, &made), CBVH_INVALID_ARGUMENT, "or allow meshes outside");
     const cbvh_robot_options anywhere = {.size = sizeof anywhere, .allow_outside = 1};

@@ -95,7 +95,8 @@ pub fn bake_file(name: &str, file: &Uint8Array, options: &JsValue) -> Result<Mes
     let mesh = input::read_bytes_with(&bytes, format, path, &self::options(options)?).map_err(refused)?;
     // The bake does not need the file.
     drop(bytes);
-    let told = Reflect::get(options, &"onWarning".into()).ok().and_then(|told| told.dyn_into::<Function>().ok());
+    let told =
+        Reflect::get(options, &"onWarning".into()).ok().and_then(|told| told.dyn_into::<Function>().ok());
     for warning in told.iter().flat_map(|told| mesh.warnings.iter().map(move |warning| (told, warning))) {
         warning.0.call1(&JsValue::UNDEFINED, &warning.1.into())?;
     }
