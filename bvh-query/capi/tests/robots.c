@@ -700,7 +700,7 @@ static void misuse(void) {
         FAILS(cbvh_robot_edge_motions(robot, room, joints, JOINTS, 3, NULL, motion), CBVH_INVALID_ARGUMENT, "starts[2]: ");
         FAILS(cbvh_robot_are_free(robot, room, 2, JOINTS, 2, NULL, answers), CBVH_INVALID_ARGUMENT, "coefficients[1]: joint waist");
         room[2 * JOINTS] = 0;
-        const cbvh_motion_options bad = {.size = sizeof bad, .clearance = -1}, small = {.size = 16};
+        const cbvh_motion_options bad = {.size = sizeof bad, .clearance = -1}, small = {.size = 12};
         FAILS(cbvh_robot_edges_are_free(robot, joints, joints, JOINTS, 3, &bad, answers), CBVH_INVALID_ARGUMENT, "clearance");
         FAILS(cbvh_robot_edge_motions(robot, joints, joints, JOINTS, 3, &small, motion), CBVH_INVALID_ARGUMENT,
               "options.size: expected 24");
