@@ -138,19 +138,25 @@ impl Model {
 
     /// Returns the joints above a group, from there to the root.
     pub(crate) fn above(&self, group: usize) -> impl Iterator<Item = usize> {
-        std::iter::successors(self.groups[group], |&joint| self.groups[self.joints[joint].parent])
+        self.between(group, 0)
     }
 
-    /// Returns the joints between two groups. The root is where the world is.
-    pub(crate) fn chain(&self, a: usize, b: usize) -> Chain {
-        let [mut a, mut b] = [a, b].map(|group| self.above(group).collect::<Vec<_>>());
-        while let (Some(x), Some(y)) = (a.last(), b.last())
-            && x == y
-        {
-            a.pop();
-            b.pop();
+    /// Returns the joints between a group and one that it hangs from, in this order.
+    pub(crate) fn between(&self, group: usize, top: usize) -> impl Iterator<Item = usize> {
+        let above = move |group: usize| self.groups[group].filter(|_| group != top);
+        std::iter::successors(above(group), move |&joint| above(self.joints[joint].parent))
+    }
+
+    /// Returns the group nearest to two groups that both hang from.
+    pub(crate) fn common(&self, mut a: usize, mut b: usize) -> usize {
+        while a != b {
+            // Each group comes after the one that it hangs from.
+            let later = if a > b { &mut a } else { &mut b };
+            let joint =
+                self.groups[*later].expect("only the first group has no joint, and no other comes before it");
+            *later = self.joints[joint].parent;
         }
-        Chain { a, b }
+        a
     }
 
     /// Returns the number of a link.
@@ -161,13 +167,6 @@ impl Model {
             known: self.links.iter().map(|link| link.name.clone()).collect(),
         })
     }
-}
-
-/// The joints between two groups: from each of them up to the first common one.
-#[derive(Debug)]
-pub(crate) struct Chain {
-    pub(crate) a: Vec<usize>,
-    pub(crate) b: Vec<usize>,
 }
 
 impl Joint {

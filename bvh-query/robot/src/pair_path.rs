@@ -92,13 +92,13 @@ impl<'a> PairPath<'a> {
             }
         };
         let [first, second] = [pair.a, pair.b].map(|part| &setting.parts[part]);
-        let ((a, b), (above_a, above_b)) = if first.radius < second.radius {
-            ((second, first), (&pair.chain.b, &pair.chain.a))
-        } else {
-            ((first, second), (&pair.chain.a, &pair.chain.b))
-        };
-        let from_b = above_b.iter().map(|&joint| step(joint, false));
-        let steps: Vec<_> = from_b.chain(above_a.iter().rev().map(|&joint| step(joint, true))).collect();
+        let (a, b) = if first.radius < second.radius { (second, first) } else { (first, second) };
+        let model = joints.model;
+        let top = model.common(a.group, b.group);
+        let mut steps: Vec<_> = model.between(b.group, top).map(|joint| step(joint, false)).collect();
+        let down = steps.len();
+        steps.extend(model.between(a.group, top).map(|joint| step(joint, true)));
+        steps[down..].reverse();
         let still = |part: &Part| length(part.origin.translation) + length(part.middle) + part.radius;
         let way = |step: &Step<'_>| length(step.joint.origin.translation) + step.slide.way;
         let farthest = still(a) + still(b) + steps.iter().map(way).sum::<f64>();
@@ -261,6 +261,32 @@ mod tests {
             largest = largest.max(off / bound);
         }
         largest
+    }
+
+    #[test]
+    fn steps_lead_from_b_up_to_the_common_group_and_down_to_a() {
+        let random = &mut Random::new(34);
+        let mut turns = 0;
+        for round in 0..20 {
+            let robot = robot(&tree(random, 2 + round), Base::Floating);
+            let (setting, numbers) = (&robot.setting, values(random, &robot, 1.0));
+            let edge = Edge::straight(&numbers, &numbers).unwrap();
+            let joints = JointPaths::new(&setting.model, &edge);
+            for pair in &setting.pairs {
+                let path = PairPath::new(setting, pair, &joints).unwrap();
+                let [a, b] = [path.a, path.b].map(|part| setting.model.above(part.group).collect::<Vec<_>>());
+                let up = b.iter().filter(|joint| !a.contains(joint)).map(|&joint| (joint, false));
+                let down = a.iter().rev().filter(|joint| !b.contains(joint)).map(|&joint| (joint, true));
+                let expected: Vec<_> = up.chain(down).collect();
+                let joint = |step: &Step<'_>| {
+                    setting.model.joints.iter().position(|joint| std::ptr::eq(joint, step.joint)).unwrap()
+                };
+                let found: Vec<_> = path.steps.iter().map(|step| (joint(step), step.is_inverse)).collect();
+                assert_eq!(found, expected);
+                turns += usize::from(found.windows(2).any(|two| two[0].1 != two[1].1));
+            }
+        }
+        assert!(turns > 100, "{turns}");
     }
 
     #[test]

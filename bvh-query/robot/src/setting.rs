@@ -2,9 +2,9 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
-use crate::model::{Chain, Model};
+use crate::model::Model;
 use bvh_query::{OwnedShape, Pose, Shape};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// A link, an obstacle or an attached object: shapes that do not move against each other.
@@ -106,9 +106,10 @@ pub(crate) struct Pair {
     pub(crate) b: usize,
     /// The sum of the radii of both balls.
     pub(crate) reach: f64,
-    /// The joints between both.
-    pub(crate) chain: Arc<Chain>,
 }
+
+// A file of some hundred KiB may have 2^24 of them.
+const _: () = assert!(size_of::<Pair>() <= 24);
 
 /// What does not change while questions are asked: all threads share it.
 #[derive(Clone, Debug)]
@@ -122,7 +123,6 @@ pub(crate) struct Setting {
 impl Setting {
     /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch.
     pub(crate) fn list_pairs(&mut self, allowed: &HashSet<[usize; 2]>) {
-        let mut chains: HashMap<[usize; 2], Arc<Chain>> = HashMap::new();
         let mut pairs = Vec::new();
         for (a, one) in self.parts.iter().enumerate() {
             for (b, other) in self.parts.iter().enumerate().skip(a + 1) {
@@ -131,10 +131,8 @@ impl Setting {
                 if is_rigid || allowed.contains(&[one.body, other.body]) {
                     continue;
                 }
-                let key = [one.group, other.group];
-                let chain = chains.entry(key).or_insert_with(|| Arc::new(self.model.chain(key[0], key[1])));
                 let reach = (one.radius + other.radius) * ROUNDED_UP;
-                pairs.push(Pair { a, b, reach, chain: Arc::clone(chain) });
+                pairs.push(Pair { a, b, reach });
             }
         }
         self.pairs = pairs;

@@ -264,6 +264,24 @@ fn groups_have_a_limit_together() {
     assert!(told.contains("expected groups of at most 4194304 joints together"), "{told}");
 }
 
+/// A list of the joints between each two of 1,000 links took 5 GB, and grew with the cube of their number.
+#[test]
+fn a_long_chain_of_links_takes_the_memory_of_its_pairs() {
+    let mut text = row(2000, 0);
+    for link in 1..2000 {
+        let child = format!("<parent link=\"base\"/><child link=\"l{link}\"/>");
+        let below =
+            format!("<parent link=\"l{}\"/><origin xyz=\"1 0 0\"/><child link=\"l{link}\"/>", link - 1);
+        text = text.replace(&child, &below);
+    }
+    let mut robot = of_texts(&text, None).unwrap();
+    let mut q = vec![0.0; 2000];
+    assert!(!robot.collide(&q).unwrap());
+    // The last link slides back to the first one.
+    q[1999] = -1998.9;
+    assert!(robot.collide(&q).unwrap());
+}
+
 #[test]
 fn mimic_joints_have_a_limit() {
     let chain = |count: usize| {
