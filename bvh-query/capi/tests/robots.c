@@ -604,7 +604,7 @@ static void misuse(void) {
     snprintf(outside, sizeof outside, "<robot name=\"r\"><link name=\"a\"><collision><geometry><mesh filename=\"%s/%s\"/>"
         "</geometry></collision></link></robot>", folder, in(testdata, "robot/base.obj"));
     write_file(in(scratch, "outside.urdf"), outside);
-    FAILS(cbvh_robot_from_urdf(in(scratch, "outside.urdf"), NULL, &made), CBVH_INVALID_ARGUMENT, "or allow meshes outside");
+    FAILS(cbvh_robot_from_urdf(in(scratch, "outside.urdf"), NULL, &made), CBVH_INVALID_ARGUMENT, "or set allow_outside");
     const cbvh_robot_options anywhere = {.size = sizeof anywhere, .allow_outside = 1};
     OK(cbvh_robot_from_urdf(in(scratch, "outside.urdf"), &anywhere, &made));
     OK(cbvh_robot_free(made));

@@ -269,7 +269,7 @@ class Describing(unittest.TestCase):
         path = self.write("arm.urdf", text)
         with self.assertRaises(ValueError) as caught:
             cbvh.Robot.from_urdf(path)
-        self.assertIn("or allow meshes outside", str(caught.exception))
+        self.assertIn("or set allow_outside", str(caught.exception))
         for options in ({"allow_outside": True}, {"package_dirs": [URDF.parent]}):
             self.assertEqual(len(cbvh.Robot.from_urdf(path, **options).links), 5)
 

@@ -18,7 +18,7 @@ pub enum RobotError {
         source: io::Error,
     },
     /// A description is too long.
-    #[error("{}: expected at most {most} bytes, found more", path.display())]
+    #[error("{}: expected at most {most} bytes, found more; leave out what is about neither links nor joints", path.display())]
     TooLong {
         /// The file.
         path: PathBuf,
@@ -55,7 +55,7 @@ pub enum RobotError {
     /// A mesh is in no folder in which the file may name meshes.
     #[error(
         "{}: link {link}: expected the mesh {uri} below {}, or in a package, found it at {}; give its folder as one of packages, \
-         or allow meshes outside",
+         or set allow_outside",
         path.display(), list(folders), found.display()
     )]
     Outside {

@@ -109,11 +109,11 @@ impl<'a> Reader<'a> {
         silent.sort_unstable();
         silent.dedup();
         let with_shape: Vec<usize> = (0..has_shape.len()).filter(|&link| has_shape[link]).collect();
+        let group = |link: usize| self.model.links[link].group;
         for one in silent.into_iter().filter(|&link| has_shape[link]) {
-            let pairs = with_shape
-                .iter()
-                .filter(|other| **other != one)
-                .map(|&other| [one.min(other), one.max(other)]);
+            // What is rigid is not asked about anyway.
+            let others = with_shape.iter().filter(|other| group(**other) != group(one));
+            let pairs = others.map(|&other| [one.min(other), one.max(other)]);
             self.semantics.disabled.extend(pairs.filter(|pair| !enabled.contains(pair)));
         }
         Ok(self.semantics)
@@ -180,7 +180,7 @@ impl<'a> Reader<'a> {
                         .map(|link| link.into_iter().flat_map(|link| model.above(model.links[link].group)));
                     let base: HashSet<usize> = base.collect();
                     joints.extend(tip.filter(|joint| !base.contains(joint)));
-                    self.places += base.len();
+                    self.places += base.len() + joints.len();
                 }
                 "group" => {
                     let name = self.attribute(child, "name")?;

@@ -16,6 +16,9 @@ use std::path::Path;
 const BASE: &str = "base";
 /// The most mimic joints of which each mimics the next one. This bounds the work for each, too.
 const MAX_MIMICS: usize = 64;
+/// The most shapes, and the most pairs of them that can move against each other.
+const MAX_SHAPES: usize = 1 << 15;
+const MAX_PAIRS: usize = 1 << 24;
 const PLANAR: [&str; 3] = ["x", "y", "theta"];
 const FLOATING: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 
@@ -44,19 +47,38 @@ pub(crate) fn read(
 ) -> Result<(Model, Vec<Element>), RobotError> {
     let urdf = Urdf { description: &Description::parse(path, text)? };
     let model = urdf.model(base)?;
+    let links: HashMap<&str, usize> =
+        model.links.iter().zip(0..).map(|(link, number)| (link.name.as_str(), number)).collect();
     let mut elements = Vec::new();
     let name = match geometry {
         Geometry::Collision => "collision",
         Geometry::Visual => "visual",
     };
     for node in children(urdf.description.root(), "link") {
-        let link = model.link(urdf.description.attribute(node, "name")?)?;
+        let link = links[urdf.description.attribute(node, "name")?];
         for node in children(node, name) {
             let (origin, shape) = (urdf.origin(node)?, urdf.shape(node)?);
             elements.push(Element { link, origin, shape });
         }
     }
-    Ok((model, elements))
+    let refuse = |expected, found: usize| {
+        Err(urdf.description.error(urdf.description.root(), expected, format!("{found}")))
+    };
+    match (elements.len(), count_pairs(&model, &elements)) {
+        (shapes, _) if shapes > MAX_SHAPES => refuse("at most 32768 shapes", shapes),
+        (_, pairs) if pairs > MAX_PAIRS => {
+            refuse("at most 16777216 pairs of shapes that move against each other", pairs)
+        }
+        _ => Ok((model, elements)),
+    }
+}
+
+/// Returns how many pairs of shapes can move against each other: all but those of one group.
+fn count_pairs(model: &Model, elements: &[Element]) -> usize {
+    let mut counts = vec![0; model.groups.len()];
+    elements.iter().for_each(|element| counts[model.links[element.link].group] += 1);
+    let pairs = |count: usize| count * count.saturating_sub(1) / 2;
+    pairs(elements.len()) - counts.into_iter().map(pairs).sum::<usize>()
 }
 
 struct Urdf<'a> {

@@ -1,7 +1,7 @@
 //! Reads elements of robots' descriptions: attributes, numbers, and where something is wrong.
 
 use crate::error::RobotError;
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Error, Node};
 use std::fmt::Display;
 use std::fs::File;
 use std::io::Read;
@@ -27,6 +27,16 @@ const READ: [&str; 7] = [
 /// The most bytes of a URDF or SRDF file. The largest that are in use have some MiB.
 pub(crate) const MAX_BYTES: u64 = 64 << 20;
 
+/// The most attributes of an element. The parser compares each with all others.
+const MAX_ATTRIBUTES: usize = 256;
+
+/// The most declarations of namespaces in a file. The parser searches those that hold for each element, and copies them for each
+/// element that adds one.
+const MAX_NAMESPACES: usize = 256;
+
+/// What is expected of a file that was written for xacro.
+const NO_MACROS: &str = "a description without macros; run xacro on the file first";
+
 /// Reads a file of at most so many bytes.
 pub(crate) fn text_of(path: &Path, most: u64) -> Result<String, RobotError> {
     let failed = |source| RobotError::Io { path: path.to_owned(), source };
@@ -51,7 +61,21 @@ impl<'a> Description<'a> {
             expected,
             found,
         };
-        let document = Document::parse(text).map_err(|found| description("XML", found.to_string()))?;
+        // Without these, a parse may take the square of the length in time and in memory.
+        if text.matches("xmlns").count() > MAX_NAMESPACES {
+            return Err(description("at most 256 declarations of namespaces", "more".to_owned()));
+        }
+        let mut tags = text.split('<').filter(|tag| !tag.starts_with('!'));
+        if let Some(tag) = tags.find(|tag| attributes(tag) > MAX_ATTRIBUTES) {
+            let name = tag.split(|c: char| c.is_whitespace()).next().unwrap_or_default();
+            return Err(description("at most 256 attributes", shown(&format!("more, of <{name}>"))));
+        }
+        let document = Document::parse(text).map_err(|found| match found {
+            Error::UnknownNamespace(prefix, place) if prefix == "xacro" => {
+                description(NO_MACROS, format!("xacro: at {place}"))
+            }
+            found => description("XML", found.to_string()),
+        })?;
         let root = document.root_element();
         let name = root.tag_name().name();
         if name != "robot" {
@@ -69,18 +93,17 @@ impl<'a> Description<'a> {
 
     /// Refuses what xacro would have replaced: its elements, and expressions where they would matter.
     fn refuse_xacro(&self) -> Result<(), RobotError> {
-        let expected = "a description without macros; run xacro on the file first";
         let is_expression = |text: &str| text.contains("${") || text.contains("$(");
         for part in self.root().children().filter(Node::is_element) {
             let is_read = READ.contains(&part.tag_name().name());
             for node in part.descendants().filter(Node::is_element) {
                 if node.tag_name().namespace().is_some_and(|namespace| namespace.contains("xacro")) {
-                    return Err(self.error(node, expected, format!("<xacro:{}>", node.tag_name().name())));
+                    return Err(self.error(node, NO_MACROS, format!("<xacro:{}>", node.tag_name().name())));
                 }
                 let expression = node.attributes().find(|of| is_read && is_expression(of.value()));
                 if let Some(attribute) = expression {
                     let found = format!("{}=\"{}\"", attribute.name(), attribute.value());
-                    return Err(self.error(node, expected, found));
+                    return Err(self.error(node, NO_MACROS, found));
                 }
             }
         }
@@ -139,6 +162,20 @@ impl<'a> Description<'a> {
         let found = self.numbers(node, name)?;
         found.map(|[number]| number).ok_or_else(|| self.error(node, name, "no such attribute"))
     }
+}
+
+/// Returns how many attributes a tag has, given the text from behind its `<`.
+fn attributes(tag: &str) -> usize {
+    let (mut quote, mut values) = (None, 0);
+    for byte in tag.bytes() {
+        match (quote, byte) {
+            (Some(open), byte) if byte == open => (quote, values) = (None, values + 1),
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (None, b'>') => break,
+            _ => {}
+        }
+    }
+    values
 }
 
 /// Escapes control characters, so that no name in a file begins a line of a message.
