@@ -6,6 +6,8 @@ mod common;
 
 #[cfg(feature = "parallel")]
 mod batch;
+mod default_tolerance;
+mod labelled_motions;
 mod memory;
 mod motion;
 #[cfg(feature = "parallel")]

@@ -1,10 +1,8 @@
-//! Certified motions: against the plain walk over cells of time that defines them, to the bit; against poses along the way;
-//! and against labelled motions.
+//! Certified motions: against the plain walk over cells of time that defines them, to the bit; and against poses along the way.
 
 use crate::common::shapes::{cube, plate, sphere, torus};
 use crate::common::{
-    Random, Triangle, bake, baked, fcl_pair, note, queriers, random_pose, shared, shared_mesh, stated,
-    testdata, translation as at,
+    Random, Triangle, bake, baked, fcl_pair, note, queriers, random_pose, shared_mesh, translation as at,
 };
 use bvh_bake::mesh::Mesh;
 use bvh_query::{
@@ -12,7 +10,6 @@ use bvh_query::{
     RelativePath, RigidPath, displacement, path_reach,
 };
 use cbvh_testkit::depth::rounds;
-use std::path::Path;
 
 /// The definition: cells in the order of time, each decided in its middle.
 fn plain(
@@ -313,59 +310,6 @@ fn hard_motions_have_their_answers() {
     assert!(matches!(answer, MotionAnswer::Near { nearest, .. } if nearest.distance <= 1e-2), "{answer:?}");
 }
 
-/// A plate of two triangles with sides of 1,000, at height 0.
-fn floor() -> Bvh {
-    let corner = |x: f64, y: f64| [500.0 * x, 500.0 * y, 0.0];
-    let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-    baked(&[[a, b, c], [a, c, d]])
-}
-
-/// What is small meets a large plate as exactly as its own size asks for, not as the plate's does.
-#[test]
-fn the_default_tolerance_is_that_of_the_smaller_shape() {
-    let (floor, block, point) = (floor(), baked(&cube()), baked(&[[[0.0; 3]; 3]]));
-    let ball = point.all().rounded(0.5).unwrap();
-    let falls = Motion::between(&at(1.0, 2.0, 10.0), &at(1.0, 2.0, -10.0)).unwrap();
-    let options = MotionOptions::new();
-    for querier in &mut queriers() {
-        for (falling, height, size) in [(block.all(), 1.0, 12f64.sqrt()), (ball, 0.5, 1.0)] {
-            for (a, b, path) in [(floor.all(), falling, true), (falling, floor.all(), false)] {
-                assert_eq!(options.tolerance_between(a, b), 1e-6 * size);
-                // Seen from what falls, the plate rises.
-                let rises = Motion::between(&at(-1.0, -2.0, -10.0), &at(-1.0, -2.0, 10.0)).unwrap();
-                let answer = querier.motion(a, b, if path { &falls } else { &rises }, &options).unwrap();
-                let MotionAnswer::Hit { free_until, touching_at, .. } = answer else { panic!("{answer:?}") };
-                let met = (10.0 - height) / 20.0;
-                assert!(free_until <= met + 1e-15 && touching_at >= met - 1e-15, "{answer:?}");
-                assert!(20.0 * (touching_at - free_until) <= 1e-6 * size, "{answer:?}");
-            }
-        }
-    }
-    // A point has no size of its own, and two have none at all.
-    assert_eq!(options.tolerance_between(&point, &floor), 1e-6 * 2e6f64.sqrt());
-    assert_eq!(options.tolerance_between(&point, &point), 1e-6);
-    assert_eq!(options.tolerance(0.25).tolerance_between(&point, &floor), 0.25);
-}
-
-/// However small a shape is, and however far from its frame's origin, the default tolerance is one that poses resolve.
-#[test]
-fn rounded_poses_resolve_the_default_tolerance() {
-    let grain = |size: f64, far: f64| -> Bvh {
-        baked(&cube().into_iter().map(|t| t.map(|p| p.map(|v| size * v + far))).collect::<Vec<_>>())
-    };
-    let mut querier = Querier::new().unwrap();
-    for (size, far) in [(1e-9, 0.0), (2f64.powi(-20), 0.0), (2f64.powi(-10), 1e7)] {
-        let (floor, grain) = (floor(), grain(size, far));
-        let height = |z: f64| at(-far, -far, z - far);
-        let falls = Motion::between(&height(10.0), &height(-10.0)).unwrap();
-        let answer = querier.motion(&floor, &grain, &falls, &MotionOptions::new()).unwrap();
-        let MotionAnswer::Hit { free_until, touching_at, .. } = answer else { panic!("{answer:?}") };
-        let most = MotionOptions::new().tolerance_between(&floor, &grain) + 1e-9 * (1.0 + far);
-        assert!(free_until <= 0.5 && 20.0 * (touching_at - free_until) <= most, "{answer:?}");
-        assert!(20.0 * (0.5 - touching_at).abs() <= size + most, "{answer:?}");
-    }
-}
-
 /// On any number of threads, a batch has the answers of the querier.
 #[test]
 #[cfg(feature = "parallel")]
@@ -561,120 +505,4 @@ fn a_path_that_jumps_keeps_no_question_busy() {
             assert!(!matches!(is_free, Err(QueryError::Budget { .. })), "{to}: {is_free:?}");
         }
     }
-}
-
-#[test]
-fn labelled_motions_of_a_small_pair_are_answered_rightly() {
-    let text = std::fs::read_to_string(testdata("labelled/motions.txt")).unwrap();
-    let answers = check_labelled("fcl", fcl_pair(), stated(&text));
-    assert!(answers.all >= 40 && answers.hits >= 10 && answers.all - answers.hits >= 10, "{answers:?}");
-    assert_eq!(answers.near, 0);
-}
-
-#[test]
-#[ignore = "needs ../shared"]
-fn labelled_motions_are_answered_rightly() {
-    for (name, mesh_a, mesh_b) in [
-        ("fcl", "fclenv", "fclrob"),
-        ("bunny", "bunny", "bunny"),
-        ("apollo", "apollo", "apollo"),
-        ("a1hand", "a1", "hand"),
-    ] {
-        let texts = ["long", "short", "slide", "spin"]
-            .map(|kind| std::fs::read_to_string(shared(&format!("motions/{name}_{kind}.txt"))).unwrap());
-        let step = if rounds(1) > 1 { 1 } else { 10 };
-        let lines = texts.iter().flat_map(|text| stated(text).step_by(step));
-        let meshes = [mesh_a, mesh_b].map(|mesh| shared_mesh(&format!("{mesh}.obj")));
-        let answers = check_labelled(name, meshes, lines);
-        assert!(answers.all >= 40 && 1000 * answers.near <= answers.all, "{name}: {answers:?}");
-    }
-}
-
-/// How many motions were answered, how many of them hit, and how many are near.
-#[derive(Debug, Default)]
-struct Answered {
-    all: u32,
-    hits: u32,
-    near: u32,
-}
-
-/// Checks motions of a pair of meshes with labels: `# hit T clear C` or `# free? D [proven]`. The labels are about coordinates
-/// rounded to f32.
-fn check_labelled<'a>(name: &str, meshes: [Mesh; 2], lines: impl Iterator<Item = &'a str>) -> Answered {
-    let [a, b] = meshes.map(|mut mesh| {
-        for object in &mut mesh.objects {
-            object.positions.iter_mut().for_each(|p| *p = p.map(|v| f64::from(v as f32)));
-        }
-        bake(&mesh, &bvh_bake::Options::default())
-    });
-    let mut querier = Querier::new().unwrap();
-    let mut answers = Answered::default();
-    for line in lines {
-        let (numbers, label) = line.split_once('#').unwrap();
-        let numbers: Vec<f64> = numbers.split_whitespace().map(|word| word.parse().unwrap()).collect();
-        let pose = |at: usize| Pose::from_rows(numbers[at..at + 12].try_into().unwrap()).unwrap();
-        let motion = Motion::between(&pose(0), &pose(12)).unwrap();
-        let answer = querier.motion(&a, &b, &motion, &MotionOptions::new()).unwrap();
-        let words: Vec<&str> = label.split_whitespace().collect();
-        let is_free = querier.is_free(&a, &b, &motion, &MotionOptions::new()).unwrap();
-        assert_eq!(is_free, answer == MotionAnswer::Free);
-        answers.all += 1;
-        match (words[0], answer) {
-            // Ten digits are printed.
-            ("hit", MotionAnswer::Hit { free_until, touching_at, .. }) => {
-                let [contact, clear] = [words[1], words[3]].map(|word| word.parse::<f64>().unwrap());
-                assert!(free_until <= contact + 1e-8 && touching_at >= clear - 1e-10, "{name}: {line}");
-                answers.hits += 1;
-            }
-            ("free?", MotionAnswer::Free) => {}
-            (_, MotionAnswer::Near { .. }) => answers.near += 1,
-            (_, answer) => panic!("{name}: {line}, found {answer:?}"),
-        }
-    }
-    answers
-}
-
-/// Translations of one triangle past another, which may be segments or points, with labels from rational arithmetic. Those
-/// whose vertices are f32 are baked; many touch at the start, or only just. The search itself has a test with all of them.
-#[test]
-fn exact_translations_are_answered() {
-    check_translations(&testdata("labelled/translations.txt"));
-}
-
-#[test]
-#[ignore = "needs ../shared"]
-fn more_exact_translations_are_answered() {
-    check_translations(&shared("motions/ccd/translations.txt"));
-}
-
-fn check_translations(path: &Path) {
-    let text = std::fs::read_to_string(path).unwrap();
-    let (mut answered, mut hit, mut near) = (0, 0, 0);
-    for line in stated(&text) {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let (hits, is_f32) = (words[2] == "1", words[3] == "1");
-        if !is_f32 {
-            continue;
-        }
-        let numbers: Vec<f64> = words[4..].iter().map(|word| word.parse().unwrap()).collect();
-        let points = numbers.as_chunks::<3>().0;
-        let [a, b] = [0, 3].map(|first| baked(&[[points[first], points[first + 1], points[first + 2]]]));
-        let moved = Pose::new(*Pose::IDENTITY.rotation(), points[6]).unwrap();
-        let motion = Motion::between(&Pose::IDENTITY, &moved).unwrap();
-        for querier in &mut queriers() {
-            let answer = querier.motion(&a, &b, &motion, &MotionOptions::new().tolerance(1e-11)).unwrap();
-            match answer {
-                MotionAnswer::Free => assert!(!hits, "{line}"),
-                MotionAnswer::Hit { .. } => assert!(hits, "{line}"),
-                // A point meets a triangle at one instant, which may be no f64. Its two neighbours are apart.
-                MotionAnswer::Near { nearest, .. } => {
-                    assert!(hits && nearest.distance <= 1e-11, "{line}");
-                    near += 1;
-                }
-            }
-            answered += 1;
-            hit += u32::from(hits);
-        }
-    }
-    assert!(answered >= 70 && hit >= 30 && 2 * near < answered, "{near} of {answered} are near, {hit} hit");
 }
