@@ -1602,35 +1602,19 @@ public:
             });
     }
     std::vector<cbvh_body_pair> pairs_in_contact(const Joints &joints) const {
-        return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
-            return cbvh_robot_pairs_in_contact(raw(), joints.data(), joints.size(), 1, nullptr, pairs, capacity, count);
-        });
+        return pairs_of(cbvh_robot_pairs_in_contact, joints);
     }
     std::vector<std::vector<cbvh_body_pair>> pairs_in_contact(const std::vector<Joints> &joints) {
-        const Rows rows("joints", joints);
-        return detail::lists<cbvh_body_pair>(
-            room_, rows.count,
-            [&](std::size_t *each, cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
-                return cbvh_robot_pairs_in_contact(raw(), rows.data(), width(rows), rows.count, each, pairs, capacity,
-                                                   count);
-            });
+        return pairs_of(cbvh_robot_pairs_in_contact, joints);
     }
 
     /// The bodies that are inside others without touching them, each as `a` with the body around it as `b`: see
     /// cbvh_robot_pairs_inside.
     std::vector<cbvh_body_pair> pairs_inside(const Joints &joints) const {
-        return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
-            return cbvh_robot_pairs_inside(raw(), joints.data(), joints.size(), 1, nullptr, pairs, capacity, count);
-        });
+        return pairs_of(cbvh_robot_pairs_inside, joints);
     }
     std::vector<std::vector<cbvh_body_pair>> pairs_inside(const std::vector<Joints> &joints) {
-        const Rows rows("joints", joints);
-        return detail::lists<cbvh_body_pair>(
-            room_, rows.count,
-            [&](std::size_t *each, cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
-                return cbvh_robot_pairs_inside(raw(), rows.data(), width(rows), rows.count, each, pairs, capacity,
-                                               count);
-            });
+        return pairs_of(cbvh_robot_pairs_inside, joints);
     }
 
     /// The end to which joints that turn without limits go the short way: see cbvh_robot_nearest_turns.
@@ -1752,6 +1736,21 @@ private:
         });
     }
     void check_body(Body body) const { static_cast<void>(name(body)); }
+    /// Asks a question whose answer is pairs, about one configuration or many.
+    using PairsQuestion = decltype(cbvh_robot_pairs_in_contact);
+    std::vector<cbvh_body_pair> pairs_of(PairsQuestion *ask, const Joints &joints) const {
+        return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+            return ask(raw(), joints.data(), joints.size(), 1, nullptr, pairs, capacity, count);
+        });
+    }
+    std::vector<std::vector<cbvh_body_pair>> pairs_of(PairsQuestion *ask, const std::vector<Joints> &joints) {
+        const Rows rows("joints", joints);
+        return detail::lists<cbvh_body_pair>(
+            room_, rows.count,
+            [&](std::size_t *each, cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return ask(raw(), rows.data(), width(rows), rows.count, each, pairs, capacity, count);
+            });
+    }
     detail::Room room_;
     Owned handle_;
 };
