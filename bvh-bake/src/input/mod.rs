@@ -166,12 +166,13 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
     collect(&find(path)?)
 }
 
-/// Reads a mesh file as [`read`] does, and says what to do with the axis that a COLLADA file declares to point up.
+/// Reads a mesh file as [`read`] does. `up_axis` says what to do with the axis that a COLLADA file declares to point up, and
+/// `allow_outside` whether a glTF file may name buffers anywhere.
 ///
 /// # Errors
 /// The errors of [`read`].
-pub fn read_with(path: &Path, up_axis: UpAxis) -> Result<Mesh, ReadError> {
-    collect(&find(path)?.with_up_axis(up_axis))
+pub fn read_with(path: &Path, up_axis: UpAxis, allow_outside: bool) -> Result<Mesh, ReadError> {
+    collect(&find(path)?.with_up_axis(up_axis).allow_outside(allow_outside))
 }
 
 /// Reads a mesh file as a scene, which has instances. In a glTF or COLLADA file, each node with a mesh is an instance. Nodes

@@ -1111,7 +1111,7 @@ typedef struct cbvh_robot_options {
     int32_t visual;
     cbvh_robot_base base;
     /* Lets the URDF name meshes anywhere (1), or only in the folder above its own and below, in its package, in packages
-     * that it names, and in the folders of packages (0). */
+     * that it names, and in the folders of packages (0). Likewise for the buffers of glTF meshes outside their folders. */
     int32_t allow_outside;
     /* Turns COLLADA meshes so that the axis that they declare to point up becomes z (1), or leaves their coordinates as
      * they are (0), as rviz, MoveIt, Gazebo and Pinocchio do. Their unit of lengths is always applied. */

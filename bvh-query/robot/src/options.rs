@@ -46,7 +46,7 @@ pub struct RobotOptions {
     pub cache: Option<PathBuf>,
     /// Lets the URDF name meshes anywhere. By default they must be in the folder above that of the URDF or below it, in the
     /// package of the URDF, in a package that a `package://` path names, or in `packages`, because the author of the file could
-    /// otherwise choose which files of this system are read.
+    /// otherwise choose which files of this system are read. Also lets glTF meshes name buffers outside their own folders.
     pub allow_outside: bool,
 }
 

@@ -91,7 +91,7 @@ impl<'a> Shapes<'a> {
 
     /// Reads a mesh.
     fn read(&self, link: &str, path: &Path) -> Result<Mesh, RobotError> {
-        let read = read_with(path, self.options.up_axis);
+        let read = read_with(path, self.options.up_axis, self.options.allow_outside);
         Ok(read.map_err(|error| self.refused(link, error.into()))?.merged())
     }
 

@@ -184,7 +184,7 @@ fn units_and_axes_are_applied() {
     let place = |asset: &str, up_axis| {
         let nodes = "<node><translate>1 2 3</translate><instance_geometry url=\"#g\"/></node>";
         fs::write(&path, square(&quad(), nodes).replace(whole, asset)).unwrap();
-        read_with(&path, up_axis).map(|mesh| only(&mesh).positions[0])
+        read_with(&path, up_axis, false).map(|mesh| only(&mesh).positions[0])
     };
     for (asset, turned, kept) in [
         (whole, [1.0, 2.0, 3.0], [1.0, 2.0, 3.0]),

@@ -109,7 +109,8 @@ class Robot:
         applied. ``cache`` names a folder for baked meshes.
 
         Meshes must be in the folder above that of the file or below it, in its package, in a package that a ``package://`` path
-        names, or in ``package_dirs``; ``allow_outside=True`` lets the file name any. What is passed over is in `warnings`.
+        names, or in ``package_dirs``; ``allow_outside=True`` lets the file name any, and glTF meshes any buffers. What is passed
+        over is in `warnings`.
 
         Raises ValueError for a description that is not as it should be, FileNotFoundError and BakeError for its meshes.
         """

@@ -64,6 +64,22 @@ fn meshes_with_the_same_text_and_other_buffers_are_not_the_same() {
     assert_eq!(fs::read_dir(&cache).unwrap().count(), 3);
 }
 
+#[test]
+fn buffers_of_meshes_are_read_elsewhere_if_that_is_allowed() {
+    let folder = cbvh_testkit::folder();
+    let folder = folder.path();
+    write_triangle(&folder.join("mesh"), 1.0);
+    fs::rename(folder.join("mesh/m.bin"), folder.join("m.bin")).unwrap();
+    fs::write(folder.join("mesh/m.gltf"), GLTF.replace("m.bin", "../m.bin")).unwrap();
+    write_urdf(&folder.join("robot.urdf"), "mesh/m.gltf");
+    let read = |allow_outside: bool| {
+        let options = RobotOptions { allow_outside, ..RobotOptions::default() };
+        Robot::from_urdf(folder.join("robot.urdf"), &options).map(drop)
+    };
+    assert!(matches!(read(false), Err(RobotError::Mesh { .. })));
+    read(true).unwrap();
+}
+
 /// Writes a robot of one mesh.
 fn write_urdf(path: &Path, uri: &str) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
