@@ -2,6 +2,7 @@
 
 use bvh_bake::BakeError;
 use bvh_query::{BackendError, OpenError, PoseError, QueryError};
+use std::borrow::Cow;
 use std::io;
 use std::path::PathBuf;
 
@@ -33,7 +34,7 @@ pub enum RobotError {
         /// The element in question.
         place: String,
         /// What should be there.
-        expected: &'static str,
+        expected: Cow<'static, str>,
         /// What is there.
         found: String,
     },

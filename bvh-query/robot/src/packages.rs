@@ -4,6 +4,7 @@
 //! The author of a URDF need not be its reader, so that it may not name any file of the system. Meshes are in the robot's package,
 //! beside the folder of the URDF, in another package, or in a folder that the reader named.
 
+use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
@@ -19,6 +20,10 @@ pub(crate) struct Named {
 }
 
 /// Returns the file that a URDF means, or the places where it was looked for.
+///
+/// Paths are taken as they are, and the names of URIs are looked for as they are and then with their percent-encoding decoded:
+/// Pinocchio does the former, and ROS the latter, in packages too. The host `localhost` of a `file://` URI is left out. Any other first
+/// part is one of a relative path, as in Pinocchio.
 ///
 /// `package://NAME/REST` is looked for in the given folders, in those of `ROS_PACKAGE_PATH`, and in the folders above the URDF
 /// file, first as `NAME/REST` and then, in a folder that is called NAME itself, as `REST`. Packages that are installed with a
@@ -38,16 +43,18 @@ pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<Named,
     let folders = folders.iter().cloned().chain(listed).filter(|folder| !folder.as_os_str().is_empty());
     let folders: Vec<PathBuf> = folders.collect();
     let mut package = None;
-    let found = match uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://")) {
-        None => look(beside.join(uri.strip_prefix("file://").unwrap_or(uri))),
-        Some(rest) => {
-            let rest = rest.trim_start_matches('/');
-            let (name, in_package) = rest.split_once('/').unwrap_or((rest, ""));
+    let (scheme, rest) = match uri.split_once("://") {
+        Some((scheme, rest)) => (scheme.to_ascii_lowercase(), rest),
+        None => (String::new(), uri),
+    };
+    let found = match scheme.as_str() {
+        "package" | "model" => names(rest.trim_start_matches('/')).into_iter().find_map(|rest| {
+            let (name, in_package) = rest.split_once('/').unwrap_or((&rest, ""));
             let whole = absolute(urdf);
             let above = whole.ancestors().skip(1).map(Path::to_owned);
             folders.iter().cloned().chain(above).find_map(|folder| {
                 let is_itself = folder.file_name() == Some(OsStr::new(name));
-                let found = look(folder.join(rest)).map(|found| (folder.join(name), found));
+                let found = look(folder.join(&*rest)).map(|found| (folder.join(name), found));
                 let found = found.or_else(|| {
                     let itself = is_itself.then(|| folder.join(in_package)).and_then(&mut look);
                     itself.map(|found| (folder.clone(), found))
@@ -57,11 +64,43 @@ pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<Named,
                     found
                 })
             })
+        }),
+        "file" => {
+            // The path begins with the slash behind the host.
+            let path = rest.strip_prefix("localhost").filter(|path| path.starts_with('/')).unwrap_or(rest);
+            names(path).into_iter().find_map(|path| look(beside.join(&*path)))
         }
+        _ => look(beside.join(uri)),
     };
     let path = found.ok_or(tried)?;
     let is_inside = is_inside(&path, urdf, &folders, package.as_deref());
     Ok(Named { path, is_inside })
+}
+
+/// Returns the name that a part of a URI is, and the one that it encodes if that is another one.
+fn names(part: &str) -> Vec<Cow<'_, str>> {
+    [Some(Cow::Borrowed(part)), decoded(part).map(Cow::Owned)].into_iter().flatten().collect()
+}
+
+/// Returns the text that a percent-encoded one stands for, if it is another one and text.
+fn decoded(part: &str) -> Option<String> {
+    let mut pieces = part.split('%');
+    let mut bytes = pieces.next()?.as_bytes().to_vec();
+    for piece in pieces {
+        let byte = piece.get(..2).filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()));
+        match byte.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
+            Some(byte) => {
+                bytes.push(byte);
+                bytes.extend_from_slice(&piece.as_bytes()[2..]);
+            }
+            // A sign of its own.
+            None => {
+                bytes.push(b'%');
+                bytes.extend_from_slice(piece.as_bytes());
+            }
+        }
+    }
+    String::from_utf8(bytes).ok().filter(|text| text != part)
 }
 
 /// Returns whether a URDF may name a file: whether the file is in a folder that the reader named, links in it included; or, after

@@ -3,7 +3,7 @@
 use crate::error::RobotError;
 use crate::options::{Base, Geometry, RobotOptions};
 use crate::robot::Robot;
-use crate::xml::{MAX_BYTES, text_of};
+use crate::xml::text_of;
 use bvh_query::{OwnedShape, Pose};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,15 +16,23 @@ pub(crate) struct Source {
     pub(crate) srdf: Option<(PathBuf, String)>,
     pub(crate) geometry: Geometry,
     pub(crate) base: Base,
+    /// What the readers of meshes warned of.
+    pub(crate) mesh_warnings: Vec<String>,
 }
 
 impl Source {
     pub(crate) fn read(path: &Path, options: &RobotOptions) -> Result<Self, RobotError> {
-        let urdf = text_of(path, MAX_BYTES)?;
-        let srdf =
-            options.srdf.as_ref().map(|srdf| Ok::<_, RobotError>((srdf.clone(), text_of(srdf, MAX_BYTES)?)));
+        let urdf = text_of(path)?;
+        let srdf = options.srdf.as_ref().map(|srdf| Ok::<_, RobotError>((srdf.clone(), text_of(srdf)?)));
         let (geometry, base) = (options.geometry, options.base);
-        Ok(Self { path: path.to_owned(), urdf, srdf: srdf.transpose()?, geometry, base })
+        Ok(Self {
+            path: path.to_owned(),
+            urdf,
+            srdf: srdf.transpose()?,
+            geometry,
+            base,
+            mesh_warnings: Vec::new(),
+        })
     }
 }
 
@@ -39,6 +47,8 @@ pub struct RobotParts {
     pub geometry: Geometry,
     /// How the root is connected with the world.
     pub base: Base,
+    /// What the readers of meshes warned of, which is in [`Robot::warnings`].
+    pub mesh_warnings: Vec<String>,
     /// The shapes of all links without margins, in the order of the links, and of a link in that of the file.
     pub links: Vec<OwnedShape>,
     /// Obstacles and attached objects, in the order in which they were added.
@@ -89,6 +99,7 @@ impl Robot {
             srdf: source.srdf.clone(),
             geometry: source.geometry,
             base: source.base,
+            mesh_warnings: source.mesh_warnings.clone(),
             links,
             others,
             margins,
@@ -103,17 +114,18 @@ impl Robot {
     /// Those of [`Robot::from_urdf`] for the texts, and [`RobotError::Description`] unless there is a shape for each that the
     /// file describes; and those of the functions that add bodies, set margins and allow pairs.
     pub fn from_parts(parts: RobotParts) -> Result<Self, RobotError> {
-        let RobotParts { urdf: (path, urdf), srdf, geometry, base, links, others, margins, allowed } = parts;
-        let source = Source { path, urdf, srdf, geometry, base };
+        let RobotParts { urdf: (path, urdf), srdf, geometry, base, mesh_warnings, .. } = parts;
+        let (links, others, margins, allowed) = (parts.links, parts.others, parts.margins, parts.allowed);
+        let source = Source { path, urdf, srdf, geometry, base, mesh_warnings: Vec::new() };
         let path = source.path.clone();
         let mut robot = Self::of_source(source, |_, elements| {
             if links.len() == elements.len() {
-                return Ok(links);
+                return Ok((links, mesh_warnings));
             }
             let found = format!("{} shapes for {} elements", links.len(), elements.len());
             let (place, expected) =
                 ("the shapes of its links".to_owned(), "one for each element that describes one");
-            Err(RobotError::Description { path, place, expected, found })
+            Err(RobotError::Description { path, place, expected: expected.into(), found })
         })?;
         for OtherBody { name, shape, link, pose } in others {
             match link {

@@ -49,6 +49,7 @@ pub struct Robot {
     pub(crate) asker: Asker,
     pub(crate) source: Arc<Source>,
     semantics: Arc<Semantics>,
+    warnings: Arc<[String]>,
     /// Pairs of bodies whose contact is allowed, in order.
     pub(crate) allowed: Arc<HashSet<[usize; 2]>>,
     /// The setting lacks pairs after a change.
@@ -63,6 +64,7 @@ impl Clone for Robot {
             asker: self.asker.clone(),
             source: Arc::clone(&self.source),
             semantics: Arc::clone(&self.semantics),
+            warnings: Arc::clone(&self.warnings),
             allowed: Arc::clone(&self.allowed),
             is_stale: self.is_stale,
         }
@@ -73,6 +75,7 @@ impl Clone for Robot {
         self.setting = Arc::clone(&source.setting);
         self.source = Arc::clone(&source.source);
         self.semantics = Arc::clone(&source.semantics);
+        self.warnings = Arc::clone(&source.warnings);
         self.allowed = Arc::clone(&source.allowed);
         self.is_stale = source.is_stale;
     }
@@ -89,16 +92,19 @@ impl Robot {
         let mut shapes = Shapes::new(path, options);
         Self::of_source(source, |model, elements| {
             let make = |element: &Element| shapes.make(element, &model.links[element.link].name);
-            elements.iter().map(make).collect()
+            let made = elements.iter().map(make).collect::<Result<_, _>>()?;
+            Ok((made, shapes.take_warnings()))
         })
     }
 
-    /// Makes a robot of its files' texts and of the shapes of its links, one for each element, in the order of the links.
+    /// Makes a robot of its files' texts and of the shapes of its links, one for each element, in the order of the links, with what the
+    /// readers of their meshes warned of.
     pub(crate) fn of_source(
-        source: Source,
-        shapes: impl FnOnce(&Model, &[Element]) -> Result<Vec<OwnedShape>, RobotError>,
+        mut source: Source,
+        shapes: impl FnOnce(&Model, &[Element]) -> Result<(Vec<OwnedShape>, Vec<String>), RobotError>,
     ) -> Result<Self, RobotError> {
-        let (model, mut elements) = urdf::read(&source.path, &source.urdf, source.geometry, source.base)?;
+        let urdf::Robot { model, mut elements, mut warnings } =
+            urdf::read(&source.path, &source.urdf, source.geometry, source.base)?;
         let mut has_shape = vec![false; model.links.len()];
         elements.iter().for_each(|element| has_shape[element.link] = true);
         let mut semantics = match &source.srdf {
@@ -112,18 +118,23 @@ impl Robot {
         // In the order of the links, so that answers are.
         elements.sort_by_key(|element| element.link);
         let mut parts = Vec::new();
-        for (element, shape) in elements.iter().zip(shapes(&model, &elements)?) {
+        let (shapes, of_meshes) = shapes(&model, &elements)?;
+        for (element, shape) in elements.iter().zip(shapes) {
             let link = &model.links[element.link];
             let origin = link.origin.of(&element.origin);
             parts.push(Part::new(element.link, (link.group, false), origin, shape, 0.0)?);
         }
         let allowed = std::mem::take(&mut semantics.disabled).into_iter().collect();
+        warnings.extend_from_slice(&of_meshes);
+        warnings.append(&mut semantics.warnings);
+        source.mesh_warnings = of_meshes;
         let setting = Setting { model: Arc::new(model), parts, pairs: Vec::new(), bodies };
         let mut robot = Self {
             setting: Arc::new(setting),
             asker: Asker::new()?,
             source: Arc::new(source),
             semantics: Arc::new(semantics),
+            warnings: warnings.into(),
             allowed: Arc::new(allowed),
             is_stale: true,
         };
@@ -149,7 +160,8 @@ impl Robot {
         &self.setting.model.numbers
     }
 
-    /// Returns the lower and the upper limit of each joint value, infinite where there is none. No question checks them.
+    /// Returns the lower and the upper limit of each joint value, infinite where there is none. A lower limit above the upper one is none,
+    /// with a warning. No question checks them.
     pub fn limits(&self) -> &[[f64; 2]] {
         &self.setting.model.limits
     }
@@ -159,10 +171,12 @@ impl Robot {
         self.setting.model.links.iter().map(|link| link.name.as_str())
     }
 
-    /// Returns what was passed over when the robot was read and may not be meant so, as sentences: names of links, joints and
-    /// groups in the SRDF that the robot does not have, for example. They begin with the file and the line.
+    /// Returns what was read otherwise than its author may have meant, one line each: first of the URDF, then of the meshes, then of the
+    /// SRDF. Among them are a robot without shapes, mimic joints without a joint to follow, limits that are the wrong way round, names
+    /// in the SRDF that the robot does not have, and what the readers of meshes left out. A line begins with the file and the line
+    /// there or the link. Each of both files has up to 101 of them, the last of which says so if there are more.
     pub fn warnings(&self) -> &[String] {
-        &self.semantics.warnings
+        &self.warnings
     }
 
     /// Returns the groups of the SRDF.

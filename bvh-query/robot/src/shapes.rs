@@ -5,11 +5,12 @@ use crate::frame::Point;
 use crate::options::RobotOptions;
 use crate::packages::{find, folders_of};
 use crate::urdf::{Described, Element};
+use crate::xml::shown;
 use bvh_bake::input::mesh::{Mesh, Object};
 use bvh_bake::input::read_with;
 use bvh_bake::{BakeError, Options, generator, shapes, to_bytes, write_atomically};
 use bvh_query::{Bvh, OwnedShape, QueryError};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
@@ -21,11 +22,21 @@ pub(crate) struct Shapes<'a> {
     baked: HashMap<u128, OwnedShape>,
     /// The same shapes by where they were read, and with which scale.
     placed: HashMap<(PathBuf, [u64; 3]), OwnedShape>,
+    /// What the readers of meshes warn of, once for each file.
+    warnings: Vec<String>,
+    /// The files that have warnings there.
+    warned: HashSet<PathBuf>,
 }
 
 impl<'a> Shapes<'a> {
     pub(crate) fn new(urdf: &'a Path, options: &'a RobotOptions) -> Self {
-        Self { urdf, options, baked: HashMap::new(), placed: HashMap::new() }
+        let (baked, placed) = (HashMap::new(), HashMap::new());
+        Self { urdf, options, baked, placed, warnings: Vec::new(), warned: HashSet::new() }
+    }
+
+    /// Takes out what the readers of meshes warn of. Each line names the URDF, the first link that has the mesh, and the mesh.
+    pub(crate) fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
     }
 
     /// Returns a shape of a link.
@@ -33,7 +44,7 @@ impl<'a> Shapes<'a> {
         let shape = |error: bvh_bake::ShapeError| RobotError::Description {
             path: self.urdf.to_owned(),
             place: format!("link {link}"),
-            expected: "a shape of finite size",
+            expected: "a shape of finite size".into(),
             found: error.to_string(),
         };
         let baked = |mesh: Mesh| -> Result<OwnedShape, RobotError> {
@@ -78,6 +89,10 @@ impl<'a> Shapes<'a> {
             return Ok(shape.clone());
         }
         let mut mesh = self.read(link, &named.path)?;
+        if !mesh.warnings.is_empty() && self.warned.insert(named.path) {
+            let line = |warning: String| shown(&format!("{}: link {link}: {warning}", self.urdf.display()));
+            self.warnings.extend(std::mem::take(&mut mesh.warnings).into_iter().map(line));
+        }
         rescale(&mut mesh, scale);
         let key = key(&mesh);
         let shape = match self.baked.get(&key) {

@@ -3,8 +3,9 @@
 use crate::error::RobotError;
 use crate::frame::Frame;
 use crate::model::Model;
-use crate::xml::{Description, children};
-use roxmltree::Node;
+use crate::schema::{Attribute, Tag};
+use crate::xml::Description;
+use bvh_bake::input::xml::Number;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -61,9 +62,6 @@ struct Reader<'a> {
     unknown: HashSet<(&'static str, &'a str)>,
 }
 
-/// The most names that warnings tell.
-const MAX_WARNINGS: usize = 100;
-
 /// Reads the text of a file about a robot. `has_shape` tells which links have shapes; pairs of others are never asked about. Names of
 /// links and joints that the robot does not have are passed over with a warning, because files are often shared by variants of a
 /// robot.
@@ -73,7 +71,7 @@ pub(crate) fn read(
     model: &Model,
     has_shape: &[bool],
 ) -> Result<Semantics, RobotError> {
-    let description = &Description::parse(path, text)?;
+    let description = &Description::parse(path, text, Tag::Visual)?;
     let mut numbers: HashMap<&str, Vec<usize>> = HashMap::new();
     for (place, name) in model.numbers.iter().enumerate() {
         numbers.entry(name).or_default().push(place);
@@ -93,16 +91,16 @@ impl<'a> Reader<'a> {
     fn read(mut self, has_shape: &[bool]) -> Result<Semantics, RobotError> {
         let description = self.description;
         let (mut enabled, mut silent) = (HashSet::new(), Vec::new());
-        for node in description.root().children().filter(Node::is_element) {
-            match node.tag_name().name() {
-                "disable_collisions" => {
+        for node in description.all(description.root()) {
+            match description.tag(node) {
+                Tag::DisableCollisions => {
                     let pair = self.pair(node)?;
                     self.semantics.disabled.extend(pair);
                 }
-                "enable_collisions" => enabled.extend(self.pair(node)?),
-                "disable_default_collisions" => silent.extend(self.link(node, "link")?),
-                "group" => self.group(node)?,
-                "group_state" => self.state(node)?,
+                Tag::EnableCollisions => enabled.extend(self.pair(node)?),
+                Tag::DisableDefaultCollisions => silent.extend(self.link(node, Attribute::Link)?),
+                Tag::Group => self.group(node)?,
+                Tag::GroupState => self.state(node)?,
                 _ => {}
             }
         }
@@ -116,29 +114,23 @@ impl<'a> Reader<'a> {
             let pairs = others.map(|&other| [one.min(other), one.max(other)]);
             self.semantics.disabled.extend(pairs.filter(|pair| !enabled.contains(pair)));
         }
+        self.semantics.warnings = description.take_warnings();
         Ok(self.semantics)
     }
 
-    fn attribute(&self, node: Node<'a, 'a>, name: &'static str) -> Result<&'a str, RobotError> {
-        self.description.attribute(node, name)
+    fn attribute(&self, node: Number, key: Attribute) -> Result<&'a str, RobotError> {
+        self.description.attribute(node, key)
     }
 
-    /// Warns of a name that the robot does not have.
-    fn unknown(&mut self, node: Node<'_, '_>, what: &'static str, name: &'a str) {
-        // The place in the file takes time to find, and a reader has no use for thousands.
-        if self.unknown.len() > MAX_WARNINGS || !self.unknown.insert((what, name)) {
-            return;
+    /// Warns of a name that the robot does not have, once.
+    fn unknown(&mut self, node: Number, what: &'static str, name: &'a str) {
+        if !self.description.is_full() && self.unknown.insert((what, name)) {
+            self.description.warn(node, format!("the robot has no {what} '{name}', which is passed over"));
         }
-        let warning = if self.unknown.len() <= MAX_WARNINGS {
-            format!("the robot has no {what} '{name}', which is passed over")
-        } else {
-            "the robot has not this name and maybe others, which are passed over".to_owned()
-        };
-        self.semantics.warnings.push(self.description.warning(node, warning));
     }
 
     /// Returns the number of the link that an attribute names, if the robot has it.
-    fn link(&mut self, node: Node<'a, 'a>, attribute: &'static str) -> Result<Option<usize>, RobotError> {
+    fn link(&mut self, node: Number, attribute: Attribute) -> Result<Option<usize>, RobotError> {
         let name = self.attribute(node, attribute)?;
         let link = self.links.get(name).copied();
         if link.is_none() {
@@ -148,20 +140,20 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns a pair of links, if the robot has both.
-    fn pair(&mut self, node: Node<'a, 'a>) -> Result<Option<[usize; 2]>, RobotError> {
-        let ends = [self.link(node, "link1")?, self.link(node, "link2")?];
+    fn pair(&mut self, node: Number) -> Result<Option<[usize; 2]>, RobotError> {
+        let ends = [self.link(node, Attribute::Link1)?, self.link(node, Attribute::Link2)?];
         Ok(if let [Some(a), Some(b)] = ends { Some([a.min(b), a.max(b)]) } else { None })
     }
 
     /// Reads a group: the joints named, those of links and of chains, and those of other groups.
-    fn group(&mut self, group: Node<'a, 'a>) -> Result<(), RobotError> {
-        let (name, model) = (self.attribute(group, "name")?.to_owned(), self.model);
+    fn group(&mut self, group: Number) -> Result<(), RobotError> {
+        let (name, model) = (self.attribute(group, Attribute::Name)?.to_owned(), self.model);
         let mut places = Vec::new();
-        for child in group.children().filter(Node::is_element) {
+        for child in self.description.all(group) {
             let mut joints = Vec::new();
-            match child.tag_name().name() {
-                "joint" => {
-                    let name = self.attribute(child, "name")?;
+            match self.description.tag(child) {
+                Tag::Joint => {
+                    let name = self.attribute(child, Attribute::Name)?;
                     joints.extend(self.joints.get(name));
                     // Fixed joints are not in the model.
                     if joints.is_empty() && !model.fixed.contains(name) {
@@ -169,21 +161,22 @@ impl<'a> Reader<'a> {
                     }
                 }
                 // The joint that moves it, if that is not fixed.
-                "link" => {
-                    let moved = self.link(child, "name")?.map(|link| &model.links[link]);
+                Tag::Link => {
+                    let moved = self.link(child, Attribute::Name)?.map(|link| &model.links[link]);
                     let moved = moved.filter(|link| link.origin == Frame::IDENTITY);
                     joints.extend(moved.and_then(|link| model.groups[link.group]));
                 }
-                "chain" => {
-                    let ends = [self.link(child, "base_link")?, self.link(child, "tip_link")?];
+                Tag::Chain => {
+                    let ends =
+                        [self.link(child, Attribute::BaseLink)?, self.link(child, Attribute::TipLink)?];
                     let [base, tip] = ends
                         .map(|link| link.into_iter().flat_map(|link| model.above(model.links[link].group)));
                     let base: HashSet<usize> = base.collect();
                     joints.extend(tip.filter(|joint| !base.contains(joint)));
                     self.places += base.len() + joints.len();
                 }
-                "group" => {
-                    let name = self.attribute(child, "name")?;
+                Tag::Group => {
+                    let name = self.attribute(child, Attribute::Name)?;
                     match self.groups.get(name) {
                         Some(&other) => places.extend(&self.semantics.groups[other].joints),
                         None => self.unknown(child, "group above this one", name),
@@ -212,10 +205,11 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads a named configuration.
-    fn state(&mut self, node: Node<'a, 'a>) -> Result<(), RobotError> {
+    fn state(&mut self, node: Number) -> Result<(), RobotError> {
         let mut values = Vec::new();
-        for joint in children(node, "joint") {
-            let (name, text) = (self.attribute(joint, "name")?, self.attribute(joint, "value")?);
+        for joint in self.description.children(node, Tag::Joint) {
+            let (name, text) =
+                (self.attribute(joint, Attribute::Name)?, self.attribute(joint, Attribute::Value)?);
             let Some(of_joint) = self.numbers.get(name) else {
                 // Fixed joints have no numbers, and mimic joints have those of others.
                 if !self.model.fixed.contains(name) && !self.joints.contains_key(name) {
@@ -229,8 +223,10 @@ impl<'a> Reader<'a> {
                 values.push((place, value));
             }
         }
-        let (name, group) =
-            (self.attribute(node, "name")?.to_owned(), self.attribute(node, "group")?.to_owned());
+        let (name, group) = (
+            self.attribute(node, Attribute::Name)?.to_owned(),
+            self.attribute(node, Attribute::Group)?.to_owned(),
+        );
         self.semantics.states.push(State { name, group, values });
         Ok(())
     }

@@ -5,17 +5,17 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
+use crate::mimic::{Followed, Follower, followed};
 use crate::model::{Kind, Link, Model, Value};
 use crate::options::{Base, Geometry};
-use crate::xml::{Description, child, children};
-use roxmltree::Node;
+use crate::schema::{Attribute, Tag};
+use crate::xml::Description;
+use bvh_bake::input::xml::Number;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// The name of the joint between the world and a base that moves.
 const BASE: &str = "base";
-/// The most mimic joints of which each mimics the next one. This bounds the work for each, too.
-const MAX_MIMICS: usize = 64;
 /// The most shapes, and the most pairs of them that can move against each other.
 const MAX_SHAPES: usize = 1 << 15;
 const MAX_PAIRS: usize = 1 << 24;
@@ -38,39 +38,43 @@ pub(crate) enum Described {
     Capsule { radius: f64, length: f64 },
 }
 
+/// What a URDF describes.
+pub(crate) struct Robot {
+    pub(crate) model: Model,
+    pub(crate) elements: Vec<Element>,
+    /// What is passed over.
+    pub(crate) warnings: Vec<String>,
+}
+
 /// Reads the text of a file about a robot.
-pub(crate) fn read(
-    path: &Path,
-    text: &str,
-    geometry: Geometry,
-    base: Base,
-) -> Result<(Model, Vec<Element>), RobotError> {
-    let urdf = Urdf { description: &Description::parse(path, text)? };
+pub(crate) fn read(path: &Path, text: &str, geometry: Geometry, base: Base) -> Result<Robot, RobotError> {
+    let (shapes, others) = match geometry {
+        Geometry::Collision => (Tag::Collision, Tag::Visual),
+        Geometry::Visual => (Tag::Visual, Tag::Collision),
+    };
+    let of = &Description::parse(path, text, others)?;
+    let urdf = Urdf { description: of };
     let model = urdf.model(base)?;
     let links: HashMap<&str, usize> =
         model.links.iter().zip(0..).map(|(link, number)| (link.name.as_str(), number)).collect();
     let mut elements = Vec::new();
-    let name = match geometry {
-        Geometry::Collision => "collision",
-        Geometry::Visual => "visual",
-    };
-    for node in children(urdf.description.root(), "link") {
-        let link = links[urdf.description.attribute(node, "name")?];
-        for node in children(node, name) {
+    for node in of.children(of.root(), Tag::Link) {
+        let link = links[of.attribute(node, Attribute::Name)?];
+        for node in of.children(node, shapes) {
             let (origin, shape) = (urdf.origin(node)?, urdf.shape(node)?);
             elements.push(Element { link, origin, shape });
         }
     }
-    let refuse = |expected, found: usize| {
-        Err(urdf.description.error(urdf.description.root(), expected, format!("{found}")))
-    };
+    let refuse = |expected, found: usize| Err(of.error(of.root(), expected, format!("{found}")));
     match (elements.len(), count_pairs(&model, &elements)) {
-        (shapes, _) if shapes > MAX_SHAPES => refuse("at most 32768 shapes", shapes),
+        (shapes, _) if shapes > MAX_SHAPES => return refuse("at most 32768 shapes", shapes),
         (_, pairs) if pairs > MAX_PAIRS => {
-            refuse("at most 16777216 pairs of shapes that move against each other", pairs)
+            return refuse("at most 16777216 pairs of shapes that move against each other", pairs);
         }
-        _ => Ok((model, elements)),
+        (0, _) => urdf.warn_of_no_shape(geometry, others),
+        _ => {}
     }
+    Ok(Robot { model, elements, warnings: of.take_warnings() })
 }
 
 /// Returns how many pairs of shapes can move against each other: all but those of one group.
@@ -86,41 +90,62 @@ struct Urdf<'a> {
 }
 
 /// A joint in the file.
-struct Found<'a, 'n> {
-    node: Node<'n, 'a>,
+struct Found<'n> {
+    node: Number,
     name: &'n str,
+    kind: JointType,
     /// The numbers of both links, in the order of the file.
     parent: usize,
     child: usize,
-    /// The place of the first number that sets it.
-    number: usize,
+    /// The first number that sets it.
+    by: Value,
 }
 
-impl Found<'_, '_> {
-    fn is_single(&self) -> bool {
-        matches!(self.node.attribute("type"), Some("revolute" | "continuous" | "prismatic"))
+/// The type of a joint.
+#[derive(Clone, Copy, PartialEq)]
+enum JointType {
+    Revolute,
+    Continuous,
+    Prismatic,
+    Planar,
+    Floating,
+    Fixed,
+}
+
+impl JointType {
+    fn of(name: &str) -> Option<Self> {
+        Some(match name {
+            "revolute" => Self::Revolute,
+            "continuous" => Self::Continuous,
+            "prismatic" => Self::Prismatic,
+            "planar" => Self::Planar,
+            "floating" => Self::Floating,
+            "fixed" => Self::Fixed,
+            _ => return None,
+        })
     }
 
-    fn mimic(&self) -> Option<Node<'_, '_>> {
-        child(self.node, "mimic")
+    /// Returns whether one number sets it.
+    fn is_single(self) -> bool {
+        matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
     }
 }
 
-impl<'a> Urdf<'a> {
+impl Urdf<'_> {
     /// Builds the tree.
     fn model(&self, base: Base) -> Result<Model, RobotError> {
         let (of, root) = (self.description, self.description.root());
         let mut names: HashMap<&str, usize> = HashMap::new();
         let mut links = Vec::new();
-        for node in children(root, "link") {
-            let name = of.attribute(node, "name")?;
+        for node in of.children(root, Tag::Link) {
+            let name = of.attribute(node, Attribute::Name)?;
             if names.insert(name, links.len()).is_some() {
                 return Err(of.error(node, "a name of its own", "another link that has it"));
             }
             links.push(name);
         }
         let mut model = Model {
-            name: root.attribute("name").unwrap_or_default().to_owned(),
+            name: of.label(root, Attribute::Name).to_owned(),
             links: Vec::new(),
             groups: Vec::new(),
             joints: Vec::new(),
@@ -148,7 +173,7 @@ impl<'a> Urdf<'a> {
         let roots: Vec<usize> = (0..links.len()).filter(|&link| moved_by[link].is_none()).collect();
         let &[first] = roots.as_slice() else {
             let found = format!("{} of {} links", roots.len(), links.len());
-            return Err(of.error(root, "one link that no joint moves", found));
+            return Err(of.no_tree("one link that no joint moves", found));
         };
         let mut group = 0;
         model.groups.push(None);
@@ -156,14 +181,13 @@ impl<'a> Urdf<'a> {
             group = model.add_joint(BASE, 0, Frame::IDENTITY, kind);
         }
         model.links.push(Link { name: links[first].to_owned(), group, origin: Frame::IDENTITY });
-        let mut below: Vec<Vec<&Found<'_, '_>>> = vec![Vec::new(); links.len()];
+        let mut below: Vec<Vec<&Found<'_>>> = vec![Vec::new(); links.len()];
         joints.iter().for_each(|joint| below[joint.parent].push(joint));
-        let by_name: HashMap<&str, &Found<'_, '_>> = joints.iter().map(|joint| (joint.name, joint)).collect();
         let mut next = vec![(first, group, Frame::IDENTITY)];
         while let Some((parent, group, place)) = next.pop() {
             for joint in std::mem::take(&mut below[parent]) {
                 let origin = place.of(&self.origin(joint.node)?);
-                let (group, origin) = match self.kind(joint, &by_name, &origin)? {
+                let (group, origin) = match self.kind(joint, &origin)? {
                     Some(kind) => (model.add_joint(joint.name, group, origin, kind), Frame::IDENTITY),
                     None => {
                         model.fixed.insert(joint.name.to_owned());
@@ -181,126 +205,146 @@ impl<'a> Urdf<'a> {
     }
 
     /// Reads the joints, and adds the numbers that set them.
-    fn joints(
-        &self,
-        names: &HashMap<&str, usize>,
-        model: &mut Model,
-    ) -> Result<Vec<Found<'a, '_>>, RobotError> {
+    fn joints(&self, names: &HashMap<&str, usize>, model: &mut Model) -> Result<Vec<Found<'_>>, RobotError> {
         let of = self.description;
-        let (mut joints, mut seen): (Vec<Found<'_, '_>>, HashSet<&str>) = Default::default();
-        for node in children(of.root(), "joint") {
-            let name = of.attribute(node, "name")?;
+        let (mut joints, mut seen): (Vec<Found<'_>>, HashSet<&str>) = Default::default();
+        for node in of.children(of.root(), Tag::Joint) {
+            let name = of.attribute(node, Attribute::Name)?;
             if !seen.insert(name) {
                 return Err(of.error(node, "a name of its own", "another joint that has it"));
             }
-            let link = |which: &'static str| {
-                let end = child(node, which).ok_or_else(|| of.error(node, which, "no such element"))?;
-                let name = of.attribute(end, "link")?;
+            let link = |which: Tag, lacking: &'static str| {
+                let end = of.child(node, which).ok_or_else(|| of.error(node, lacking, "no such element"))?;
+                let name = of.attribute(end, Attribute::Link)?;
                 names.get(name).copied().ok_or_else(|| of.error(end, "the name of a link", name))
             };
-            let (parent, child_link) = (link("parent")?, link("child")?);
-            let joint = Found { node, name, parent, child: child_link, number: model.numbers.len() };
-            let limit = child(node, "limit");
-            let end = |name: &str| match limit {
-                Some(limit) => Ok(of.numbers(limit, name)?.map_or(0.0, |[number]| number)),
-                None => Ok::<_, RobotError>(0.0),
-            };
-            match of.attribute(node, "type")? {
-                _ if joint.mimic().is_some() => {}
-                "planar" => add_numbers(model, name, &PLANAR),
-                "floating" => add_numbers(model, name, &FLOATING),
-                kind if joint.is_single() => {
-                    let limits = [end("lower")?, end("upper")?];
-                    let is_limited = kind != "continuous" && limits[0] < limits[1];
-                    model.numbers.push(name.to_owned());
-                    model.limits.push(if is_limited { limits } else { [f64::NEG_INFINITY, f64::INFINITY] });
-                }
-                "fixed" => {}
-                kind => return Err(of.error(node, "a joint type of URDF", kind)),
+            let (parent, child) = (link(Tag::Parent, "parent")?, link(Tag::Child, "child")?);
+            let kind = of.attribute(node, Attribute::Type)?;
+            let kind = JointType::of(kind).ok_or_else(|| of.error(node, "a joint type of URDF", kind))?;
+            let by = Value { number: 0, factor: 1.0, offset: 0.0 };
+            joints.push(Found { node, name, kind, parent, child, by });
+        }
+        let followers = joints.iter().map(|&Found { node, name, kind, .. }| Follower {
+            element: node,
+            name,
+            is_single: kind.is_single(),
+            is_fixed: kind == JointType::Fixed,
+        });
+        let followed = followed(of, &followers.collect::<Vec<_>>())?;
+        for (place, joint) in joints.iter_mut().enumerate() {
+            if followed[place].leader != place {
+                continue;
             }
-            joints.push(joint);
+            joint.by.number = model.numbers.len();
+            match joint.kind {
+                JointType::Planar => add_numbers(model, joint.name, &PLANAR),
+                JointType::Floating => add_numbers(model, joint.name, &FLOATING),
+                JointType::Fixed => {}
+                _ => {
+                    let limits = self.limits(joint)?;
+                    model.numbers.push(joint.name.to_owned());
+                    model.limits.push(limits);
+                }
+            }
+        }
+        for (place, &Followed { leader, factor, offset }) in followed.iter().enumerate() {
+            joints[place].by = Value { number: joints[leader].by.number, factor, offset };
         }
         Ok(joints)
     }
 
-    /// Returns how a joint moves its child; none if it is fixed.
-    fn kind(
-        &self,
-        joint: &Found<'_, '_>,
-        joints: &HashMap<&str, &Found<'_, '_>>,
-        origin: &Frame,
-    ) -> Result<Option<Kind>, RobotError> {
+    /// Returns the limits of a joint of one number. Limits that are the wrong way round are none, as in PyBullet; Pinocchio and MoveIt
+    /// take them as they are.
+    fn limits(&self, joint: &Found<'_>) -> Result<[f64; 2], RobotError> {
         let of = self.description;
-        if !joint.is_single() {
-            return match joint.node.attribute("type") {
-                Some("fixed") => Ok(None),
-                Some(kind) if joint.mimic().is_some() => {
-                    Err(of.error(joint.node, "a mimic joint that turns or slides", kind))
-                }
-                Some("planar") => Ok(Some(Kind::Planar(joint.number))),
-                _ => Ok(Some(Kind::Floating(joint.number))),
-            };
+        let none = [f64::NEG_INFINITY, f64::INFINITY];
+        let limit = of.child(joint.node, Tag::Limit).filter(|_| joint.kind != JointType::Continuous);
+        let Some(limit) = limit else { return Ok(none) };
+        let end = |key| Ok::<_, RobotError>(of.limit(limit, key)?.unwrap_or(0.0));
+        let [lower, upper] = [end(Attribute::Lower)?, end(Attribute::Upper)?];
+        if lower > upper {
+            let what =
+                format!("joint '{}' has the lower limit {lower} above the upper limit {upper}", joint.name);
+            of.warn(limit, what + "; it is read without limits");
         }
-        // A mimic joint may mimic another one.
-        let (mut leader, mut factor, mut offset) = (joint, 1.0, 0.0);
-        let mut steps = 0;
-        while let Some(mimic) = leader.mimic() {
-            let [times] = of.numbers(mimic, "multiplier")?.unwrap_or([1.0]);
-            let [plus] = of.numbers(mimic, "offset")?.unwrap_or([0.0]);
-            (offset, factor) = (offset + factor * plus, factor * times);
-            let name = of.attribute(mimic, "joint")?;
-            let next = joints.get(name).filter(|other| other.is_single());
-            leader = next.ok_or_else(|| of.error(mimic, "a joint that turns or slides", name))?;
-            steps += 1;
-            if steps > MAX_MIMICS {
-                let expected = "a joint at most 64 mimic joints away from the one that it follows";
-                return Err(of.error(mimic, expected, "joints that mimic each other, or more of them"));
-            }
+        Ok(if lower < upper { [lower, upper] } else { none })
+    }
+
+    /// Returns how a joint moves its child; none if it is fixed.
+    fn kind(&self, joint: &Found<'_>, origin: &Frame) -> Result<Option<Kind>, RobotError> {
+        let of = self.description;
+        match joint.kind {
+            JointType::Fixed => return Ok(None),
+            JointType::Planar => return Ok(Some(Kind::Planar(joint.by.number))),
+            JointType::Floating => return Ok(Some(Kind::Floating(joint.by.number))),
+            _ => {}
         }
-        let by = Value { number: leader.number, factor, offset };
-        let axis = child(joint.node, "axis");
-        let axis = axis.map_or(Ok(None), |axis| of.numbers(axis, "xyz"))?.unwrap_or([1.0, 0.0, 0.0]);
+        let axis = of.child(joint.node, Tag::Axis);
+        let axis = axis.map_or(Ok(None), |axis| of.numbers(axis, Attribute::Xyz))?.unwrap_or([1.0, 0.0, 0.0]);
         let long = length(axis);
-        if !(1e-6..=1e6).contains(&long) || !factor.is_finite() || !offset.is_finite() {
-            let found = format!("axis {axis:?}, factor {factor}, offset {offset}");
-            return Err(of.error(joint.node, "an axis of length 1, and finite numbers", found));
+        if !(1e-6..=1e6).contains(&long) {
+            return Err(of.error(joint.node, "an axis of length 1", format!("{axis:?}")));
         }
-        let axis = axis.map(|x| x / long);
-        Ok(Some(match joint.node.attribute("type") {
-            Some("prismatic") => Kind::Slide { by, axis },
+        let (by, axis) = (joint.by, axis.map(|x| x / long));
+        Ok(Some(match joint.kind {
+            JointType::Prismatic => Kind::Slide { by, axis },
             _ => Kind::turn(by, axis, origin),
         }))
     }
 
     /// Returns the origin of an element.
-    fn origin(&self, node: Node<'_, '_>) -> Result<Frame, RobotError> {
-        let Some(origin) = child(node, "origin") else { return Ok(Frame::IDENTITY) };
-        let numbers = |name| Ok::<_, RobotError>(self.description.numbers(origin, name)?.unwrap_or([0.0; 3]));
-        Ok(Frame::from_angles(numbers("rpy")?, numbers("xyz")?))
+    fn origin(&self, node: Number) -> Result<Frame, RobotError> {
+        let Some(origin) = self.description.child(node, Tag::Origin) else { return Ok(Frame::IDENTITY) };
+        let numbers = |key| Ok::<_, RobotError>(self.description.numbers(origin, key)?.unwrap_or([0.0; 3]));
+        Ok(Frame::from_angles(numbers(Attribute::Rpy)?, numbers(Attribute::Xyz)?))
     }
 
     /// Returns the shape of an element.
-    fn shape(&self, node: Node<'_, '_>) -> Result<Described, RobotError> {
+    fn shape(&self, node: Number) -> Result<Described, RobotError> {
         let of = self.description;
-        let shape = child(node, "geometry").and_then(|geometry| geometry.children().find(Node::is_element));
+        let shape = of.child(node, Tag::Geometry).and_then(|geometry| of.all(geometry).next());
         let shape = shape.ok_or_else(|| of.error(node, "a geometry", "none"))?;
-        let number = |name| of.number(shape, name);
-        Ok(match shape.tag_name().name() {
-            "mesh" => {
-                let scale = of.numbers(shape, "scale")?.unwrap_or([1.0; 3]);
+        let number = |key| of.number(shape, key);
+        Ok(match of.tag(shape) {
+            Tag::Mesh => {
+                let scale = of.numbers(shape, Attribute::Scale)?.unwrap_or([1.0; 3]);
                 if scale.contains(&0.0) {
                     return Err(of.error(shape, "a scale of factors other than 0", format!("{scale:?}")));
                 }
-                Described::Mesh { uri: of.attribute(shape, "filename")?.to_owned(), scale }
+                Described::Mesh { uri: of.attribute(shape, Attribute::Filename)?.to_owned(), scale }
             }
-            "box" => Described::Block(
-                of.numbers(shape, "size")?.ok_or_else(|| of.error(shape, "size", "no such attribute"))?,
+            Tag::Block => Described::Block(
+                of.numbers(shape, Attribute::Size)?.ok_or_else(|| of.lacks(shape, Attribute::Size))?,
             ),
-            "sphere" => Described::Ball(number("radius")?),
-            "cylinder" => Described::Cylinder { radius: number("radius")?, length: number("length")? },
-            "capsule" => Described::Capsule { radius: number("radius")?, length: number("length")? },
-            other => return Err(of.error(shape, "a mesh, box, sphere, cylinder or capsule", other)),
+            Tag::Ball => Described::Ball(number(Attribute::Radius)?),
+            Tag::Cylinder => {
+                Described::Cylinder { radius: number(Attribute::Radius)?, length: number(Attribute::Length)? }
+            }
+            Tag::Capsule => {
+                Described::Capsule { radius: number(Attribute::Radius)?, length: number(Attribute::Length)? }
+            }
+            _ => return Err(of.error(shape, "a mesh, box, sphere, cylinder or capsule", of.name(shape))),
         })
+    }
+
+    /// Warns that no link has a shape of the kind that is read.
+    fn warn_of_no_shape(&self, geometry: Geometry, others: Tag) {
+        let of = self.description;
+        let has_others = of.children(of.root(), Tag::Link).any(|link| of.child(link, others).is_some());
+        let remedy = match geometry {
+            Geometry::Collision if has_others => {
+                "; the option for visual geometry reads its <visual> elements"
+            }
+            Geometry::Visual if has_others => {
+                "; the option for collision geometry reads its <collision> elements"
+            }
+            _ => "",
+        };
+        let name = match geometry {
+            Geometry::Collision => "collision",
+            Geometry::Visual => "visual",
+        };
+        of.warn(of.root(), format!("no link has a <{name}>, so that the robot touches nothing{remedy}"));
     }
 }
 

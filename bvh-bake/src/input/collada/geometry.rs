@@ -4,13 +4,14 @@
 //! The ids of sources and of vertices are looked up in their own mesh, and the array of a source in that source, so that reading a mesh
 //! takes a time proportional to its text.
 
-use super::document::{Document, Ids, Number};
+use super::document::{Document, Ids};
 use super::schema::{Attribute, Tag};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::gather::SceneFaces;
 use crate::input::gltf::Sink as _;
 use crate::input::polygon::{Cutter, MAX_CORNERS};
 use crate::input::text;
+use crate::input::xml::Number;
 use crate::limits::MAX_VERTICES;
 use std::collections::HashMap;
 use std::mem;

@@ -1,16 +1,13 @@
 //! Reads COLLADA files in one of two ways, as the reader of glTF does: as a mesh, of which each geometry that a node places is an
 //! object, or as a scene of instances that share objects.
 //!
-//! Module `document` reads the XML, of which module `schema` lists the elements that matter. Module `transform` reads what places
+//! Module `document` has the XML, of which module `schema` lists the elements that matter. Module `transform` reads what places
 //! nodes, and module `geometry` reads meshes.
 //!
 //! The reader takes the visual scene that the file names or, if it names none, the only one; without any, each geometry is
 //! where it stands. Lengths become metres, and z points up. Elements that may change triangles in a way that is not known, such as
 //! controllers and `<convex_mesh>`, and references to other files are refused where they are needed, so that a mesh is never
 //! what is left of one. Lines and splines have no surface, and are left out with a warning.
-//!
-//! The parser is `quick-xml`: it keeps no tree of the file, and its time and memory grow in proportion to the file, whatever is in it.
-//! Trees that resolve namespaces and compare all attributes of an element do not promise that.
 
 mod document;
 mod geometry;
@@ -22,12 +19,13 @@ use crate::input::InputFile;
 use crate::input::frame::{self, Affine, Frame, IDENTITY, Linear, Scales, UNIT};
 use crate::input::gather::SceneFaces;
 use crate::input::gltf::Sink as _;
+use crate::input::xml::{Children, Number};
 use crate::progress::Progress;
 use crate::storage::resources::Allowance;
 use bvh_format::instances::Instance;
-use document::{Document, Ids, Number};
+use document::{Document, Ids};
 use geometry::MeshReader;
-use schema::{Attribute, Tag};
+use schema::{Attribute, Collada, Tag};
 use std::collections::HashMap;
 use transform::Transform;
 
@@ -68,7 +66,7 @@ pub(super) fn read(
     memory.require(own)?;
     let bytes = input.read_all(progress, weight)?;
     let text = document::text(&bytes, memory.less(own))?;
-    let document = &Document::parse(&text)?;
+    let document = &Document::parse(&text).map_err(Fault::from)?;
     let units = Units::of(document, input.up_axis())?;
     let placed = [Tag::Geometry, Tag::Node, Tag::VisualScene];
     let stated = document.all(Tag::Scale).filter_map(|scale| document.numbers::<3>(scale).ok());
@@ -193,7 +191,7 @@ struct Scene<'d, 'a, 's, 'r> {
 /// A node that is being visited: its children from `next` on are still to come.
 struct Visit<'d, 'a> {
     node: Number,
-    children: document::Children<'d, 'a>,
+    children: Children<'d, 'a, Collada>,
     placed: Placement,
 }
 

@@ -1,6 +1,34 @@
 //! The elements of a COLLADA file from which triangles come (COLLADA 1.4.1 and 1.5 specifications, chapter 5). All others, such as
 //! materials, animations and `<extra>`, are skipped with what is in them.
 
+use crate::input::xml::Schema;
+
+/// The schema.
+pub(super) struct Collada;
+
+impl Schema for Collada {
+    type Tag = Tag;
+    type Attribute = Attribute;
+
+    const ROOT: &'static str = "COLLADA";
+
+    fn root() -> Tag {
+        Tag::Collada
+    }
+
+    fn tag(parent: Tag, name: &str) -> Option<Tag> {
+        Tag::of(parent, name)
+    }
+
+    fn attribute(name: &str) -> Option<Attribute> {
+        Attribute::of(name)
+    }
+
+    fn has_text(tag: Tag) -> bool {
+        tag.has_text()
+    }
+}
+
 /// An element.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(super) enum Tag {

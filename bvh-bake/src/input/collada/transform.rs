@@ -1,10 +1,11 @@
 //! The transforms of nodes (COLLADA 1.4.1 specification, chapter 5): each is read from an element, and those of a node apply in
 //! their order, the last one first.
 
-use super::document::{Document, Number};
+use super::document::Document;
 use super::schema::Tag;
 use crate::error::Fault;
 use crate::input::frame::{Affine, Frame, Linear, MATRIX_ERROR, Scales, UNIT, cross, dot, normalised};
+use crate::input::xml::Number;
 
 /// One transform.
 #[derive(Clone, Copy, Debug)]

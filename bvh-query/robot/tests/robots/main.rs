@@ -9,3 +9,6 @@ mod misuse;
 mod parts;
 mod questions;
 mod turns;
+mod uris;
+mod warnings;
+mod xml;

@@ -26,7 +26,7 @@ fn each_mistake_in_a_file_is_named() {
     assert!(read(&with(JOINT, BALL)).is_ok());
     let joint = |inside: &str| JOINT.replace("</joint>", &format!("{inside}</joint>"));
     let cases = [
-        ("<robot".to_owned(), "the file: expected XML"),
+        ("<robot".to_owned(), "robot.urdf: line 1, column 1: expected XML"),
         ("<sdf/>".to_owned(), "expected the element <robot>, found <sdf>"),
         ("<robot/>".to_owned(), "expected one link that no joint moves, found 0 of 0 links"),
         (
@@ -51,8 +51,12 @@ fn each_mistake_in_a_file_is_named() {
             with(&joint("<origin xyz=\"0 nan 0\"/>"), BALL),
             "expected three finite numbers, found xyz=\"0 nan 0\"",
         ),
-        (with(&joint("<mimic joint=\"k\"/>"), BALL), "expected a joint that turns or slides, found k"),
-        (with(&joint("<mimic joint=\"j\"/>"), BALL), "joints that mimic each other"),
+        (with(&joint("<mimic/>"), BALL), "joint j, <mimic>: expected joint, found no such attribute"),
+        (
+            with(&joint("<limit lower=\"nan\"/>"), BALL),
+            "joint j, <limit>: expected a number, found lower=\"nan\"",
+        ),
+        (with(&joint("<limit upper=\"1,5\"/>"), BALL), "expected a number, found upper=\"1,5\""),
         (with(JOINT, ""), "link b, <collision>: expected a geometry, found none"),
         (with(JOINT, "<cone/>"), "expected a mesh, box, sphere, cylinder or capsule, found cone"),
         (with(JOINT, "<sphere radius=\"x\"/>"), "expected a finite number, found radius=\"x\""),

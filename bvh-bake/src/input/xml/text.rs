@@ -5,8 +5,8 @@
 
 use std::borrow::Cow;
 
-/// The most bytes from the beginning of a file in which its encoding is declared.
-const DECLARATION_BYTES: usize = 256;
+/// The most bytes from the beginning of a file in which its encoding is declared. Comments may stand before the declaration.
+const DECLARATION_BYTES: usize = 1024;
 
 /// An encoding, which decides how many bytes the text takes at most for each byte of the file.
 #[derive(Clone, Copy, PartialEq)]
@@ -19,8 +19,8 @@ enum Encoding {
     },
 }
 
-/// Returns the text of an XML file without its byte order mark. UTF-16 is recognised by the mark or by the first
-/// character; ISO-8859-1 must be declared, and Windows-1252 counts as ISO-8859-1. Every other encoding is read as UTF-8, and bytes that are none
+/// Returns the text of an XML file without its byte order mark. UTF-16 is recognised by the mark or by the zero byte of the first
+/// character, which is ASCII; ISO-8859-1 must be declared, and Windows-1252 counts as ISO-8859-1. Every other encoding is read as UTF-8, and bytes that are none
 /// are replaced, so that only names can differ from what was meant.
 pub fn text_of(bytes: &[u8]) -> Cow<'_, str> {
     match encoding(bytes) {
@@ -72,13 +72,12 @@ pub(crate) fn bytes_of_text(bytes: &[u8]) -> u64 {
 
 fn encoding(bytes: &[u8]) -> Encoding {
     match bytes {
-        [0xff, 0xfe, ..] | [b'<', 0, ..] => return Encoding::Utf16 { is_big_endian: false },
-        [0xfe, 0xff, ..] | [0, b'<', ..] => return Encoding::Utf16 { is_big_endian: true },
+        [0xff, 0xfe, ..] | [1..0x80, 0, ..] => return Encoding::Utf16 { is_big_endian: false },
+        [0xfe, 0xff, ..] | [0, 1..0x80, ..] => return Encoding::Utf16 { is_big_endian: true },
         _ => {}
     }
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(DECLARATION_BYTES)]).to_ascii_lowercase();
-    let declaration =
-        head.split("?>").next().filter(|declaration| declaration.trim_start().starts_with("<?xml"));
+    let declaration = head.split("<?xml").nth(1).and_then(|rest| rest.split("?>").next());
     let value = declaration.and_then(|declaration| declaration.split("encoding").nth(1));
     let value = value.map(|value| value.trim_start_matches([' ', '\t', '\r', '\n', '=', '"', '\'']));
     let name = value.and_then(|value| value.split(['"', '\'']).next()).unwrap_or_default();
@@ -108,9 +107,14 @@ mod tests {
             assert_eq!(text_of(&bytes), text(encoding));
             assert!(text_of(&bytes).len() as u64 <= bytes_of_text(&bytes));
         }
-        let said = text("UTF-16");
-        for mark in ["\u{feff}", ""] {
-            let units: Vec<u16> = (mark.to_owned() + &said).encode_utf16().collect();
+        // Blank lines and comments before the declaration.
+        for before in ["\n\n", "<!-- made by hand -->\n", &format!("<!-- {} -->", "long ".repeat(150))] {
+            let said = before.to_owned() + &text("ISO-8859-1");
+            assert_eq!(text_of(&latin(&said)), said);
+        }
+        for mark in ["\u{feff}", "", "\n", "\r\n \t"] {
+            let said = mark.trim_start_matches('\u{feff}').to_owned() + &text("UTF-16");
+            let units: Vec<u16> = (mark.to_owned() + &text("UTF-16")).encode_utf16().collect();
             assert_eq!(text_of(&units.iter().flat_map(|unit| unit.to_le_bytes()).collect::<Vec<_>>()), said);
             assert_eq!(text_of(&units.iter().flat_map(|unit| unit.to_be_bytes()).collect::<Vec<_>>()), said);
         }
