@@ -278,6 +278,10 @@ cbvh_status cbvh_bake(const double *vertices, size_t vertex_count, const uint32_
  * output that is up to date is not written again. `was_up_to_date` then gets 1, else 0; it may be NULL. */
 cbvh_status cbvh_bake_files(const char *const *inputs, size_t input_count, const char *output,
                             const cbvh_bake_options *options, int32_t *was_up_to_date);
+/* Writes a warning of the last cbvh_bake_files on this thread, as cbvh_mesh_object_name does: a line that names the file
+ * and the place, about what was read otherwise than its author may have meant, such as bytes that were left out.
+ * CBVH_NOT_FOUND after the last one. A bake that failed, or whose output was up to date, has none. */
+cbvh_status cbvh_bake_warning(size_t number, char *buffer, size_t capacity, size_t *length);
 
 /* --------------------------------------------------------------------------------------------------- simple shapes
  *
@@ -1156,15 +1160,17 @@ cbvh_status cbvh_robot_name(cbvh_robot robot, char *buffer, size_t capacity, siz
 /* Of a joint value: the name of a joint that turns or slides, NAME/x, NAME/y and NAME/theta of a planar joint, and NAME/x
  * to NAME/z and NAME/qx to NAME/qw of a floating one. Fixed joints and those that mimic others have no values. */
 cbvh_status cbvh_robot_joint_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
-/* Of what was passed over when the robot was read and may not be meant so: a sentence that begins with the file and the
- * line, for a name in the SRDF file that the robot does not have, for example. CBVH_NOT_FOUND after the last one. */
+/* Of what was read otherwise than its author may have meant: a line that begins with the file and the line there or the
+ * link. Among them are a robot without shapes, mimic joints without a joint to follow, limits that are the wrong way
+ * round, names in the SRDF file that the robot does not have, and what the readers of meshes left out. CBVH_NOT_FOUND
+ * after the last one. */
 cbvh_status cbvh_robot_warning(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 cbvh_status cbvh_robot_group_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 cbvh_status cbvh_robot_state_name(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 /* Of the group that a state is of. */
 cbvh_status cbvh_robot_state_group(cbvh_robot robot, size_t number, char *buffer, size_t capacity, size_t *length);
 
-/* The limits of a joint value, infinite where there are none. */
+/* The limits of a joint value, infinite where there are none. A lower limit above the upper one is none, with a warning. */
 typedef struct cbvh_joint_limits {
     double lower;
     double upper;

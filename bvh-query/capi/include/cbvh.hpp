@@ -374,6 +374,23 @@ template <class Ask> std::string text(Ask ask) {
     return found;
 }
 
+/// Asks for texts by their numbers, up to the last one.
+template <class Ask> std::vector<std::string> texts(Ask ask) {
+    std::vector<std::string> found;
+    for (;;) {
+        try {
+            found.push_back(text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+                return ask(found.size(), buffer, capacity, length);
+            }));
+        } catch (const Error &error) {
+            if (error.status() == CBVH_NOT_FOUND) {
+                return found;
+            }
+            throw;
+        }
+    }
+}
+
 /// Divides a list into one for each question.
 template <class Element>
 std::vector<std::vector<Element>> divided(const std::vector<Element> &all, const std::vector<std::size_t> &counts) {
@@ -519,6 +536,8 @@ public:
         check(cbvh_bake_files(paths.data(), paths.size(), raw_output, &raw, nullptr));
         return open(output);
     }
+    /// The warnings of the last bake_files on this thread: see cbvh_bake_warning.
+    static std::vector<std::string> bake_warnings() { return detail::texts(cbvh_bake_warning); }
 
     Mesh(Mesh &&) noexcept = default;
     Mesh &operator=(Mesh &&) noexcept = default;
@@ -1444,19 +1463,11 @@ public:
         }
         return names;
     }
-    /// What was passed over when the robot was read: see cbvh_robot_warning.
+    /// What was read otherwise than its author may have meant: see cbvh_robot_warning.
     std::vector<std::string> warnings() const {
-        std::vector<std::string> warnings;
-        for (;;) {
-            try {
-                warnings.push_back(text(cbvh_robot_warning, warnings.size()));
-            } catch (const Error &error) {
-                if (error.status() == CBVH_NOT_FOUND) {
-                    return warnings;
-                }
-                throw;
-            }
-        }
+        return detail::texts([&](std::size_t number, char *buffer, std::size_t capacity, std::size_t *length) {
+            return cbvh_robot_warning(raw(), number, buffer, capacity, length);
+        });
     }
     std::vector<Group> groups() const {
         std::vector<Group> groups;

@@ -4,16 +4,22 @@ use crate::at_hand::MESHES;
 use crate::cores;
 use crate::entry::{entry, hand_out};
 use crate::input::{each, flag, optional, options, path, pointers, text};
-use crate::output::One;
-use crate::status::Failure;
+use crate::output::{self, One};
+use crate::status::{Failure, Status};
 use crate::types::{BakeChoices, MeshHandle};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{
     BakeError, Effort, FileBake, MAX_RADIUS, Options, Outcome, Profile, TriangleEncoding, to_bytes,
 };
 use bvh_query::{Bvh, OwnedShape};
+use std::cell::RefCell;
 use std::ffi::c_char;
 use std::path::PathBuf;
+
+thread_local! {
+    /// The warnings of the last bake of files on this thread.
+    static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+}
 
 /// What the options say, checked.
 struct Choices {
@@ -147,6 +153,7 @@ pub unsafe extern "C" fn cbvh_bake_files(
             return Err(Failure::argument("inputs", "at least one path", "none"));
         }
         let (output, choices) = (path("output", output)?, choices(options)?);
+        WARNINGS.take();
         let up_to_date = optional(was_up_to_date, |_| One::new("was_up_to_date", was_up_to_date))?;
         let outcome = cores::work(|| {
             let bake = FileBake::new(inputs, output).options(choices.options);
@@ -156,6 +163,28 @@ pub unsafe extern "C" fn cbvh_bake_files(
         if let Some(mut out) = up_to_date {
             out.set(i32::from(matches!(outcome, Outcome::UpToDate(_))));
         }
+        if let Outcome::Baked(report) = outcome {
+            WARNINGS.set(report.warnings);
+        }
         Ok(())
     })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_bake_warning(
+    number: usize,
+    buffer: *mut c_char,
+    capacity: usize,
+    length: *mut usize,
+) -> i32 {
+    let write = |warnings: &RefCell<Vec<String>>| {
+        let warnings = warnings.borrow();
+        let none = || {
+            let expected = format!("expected a warning of the last bake, found the number {number}");
+            Failure::new(Status::NotFound, expected)
+        };
+        // SAFETY: the header asks for it.
+        unsafe { output::text(warnings.get(number).ok_or_else(none)?, buffer, capacity, length) }
+    };
+    entry(|| WARNINGS.with(write))
 }

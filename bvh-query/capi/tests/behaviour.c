@@ -1112,6 +1112,29 @@ static void attached(void) {
     OK(cbvh_mesh_free(large));
 }
 
+/* The warnings of a bake: those of the last one, once for what it left out. */
+static void bake_warnings(const char *folder) {
+    char input[1000], output[1000], warning[2000];
+    const char *const inputs[1] = {input};
+    size_t length = 0;
+    snprintf(input, sizeof input, "%s/line.obj", folder);
+    snprintf(output, sizeof output, "%s/line.cbvh", folder);
+    FAILS(cbvh_bake_warning(0, warning, sizeof warning, &length), CBVH_NOT_FOUND, "expected a warning of the last bake");
+    FILE *file = fopen(input, "w");
+    CHECK(file != NULL);
+    CHECK(fputs("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n", file) >= 0);
+    CHECK(fclose(file) == 0);
+    OK(cbvh_bake_files(inputs, 1, output, NULL, NULL));
+    OK(cbvh_bake_warning(0, warning, sizeof warning, &length));
+    CHECK(strstr(warning, "line.obj: line 5: left out a face of fewer than three corners") != NULL);
+    CHECK(length == strlen(warning));
+    FAILS(cbvh_bake_warning(0, warning, 9, &length), CBVH_BUFFER_TOO_SMALL, "buffer: ");
+    CHECK(length > 9 && strlen(warning) == 8);
+    FAILS(cbvh_bake_warning(1, warning, sizeof warning, &length), CBVH_NOT_FOUND, "found the number 1");
+    OK(cbvh_bake_files(inputs, 1, output, NULL, NULL));
+    FAILS(cbvh_bake_warning(0, warning, sizeof warning, &length), CBVH_NOT_FOUND, "found the number 0");
+}
+
 /* Files: baked, opened in all ways, and a scene file, in the folder that the program is given. */
 static void files(const char *folder, const char *testdata) {
     char input[1000], output[1000];
@@ -1124,6 +1147,7 @@ static void files(const char *folder, const char *testdata) {
     CHECK(up_to_date == 0);
     OK(cbvh_bake_files(inputs, 1, output, &packed, &up_to_date));
     CHECK(up_to_date == 1);
+    bake_warnings(folder);
     uint64_t triangles[4];
     cbvh_mesh opened[4];
     for (cbvh_open_mode mode = CBVH_MAP; mode <= CBVH_READ; mode++) {

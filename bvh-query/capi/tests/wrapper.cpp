@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <unordered_set>
@@ -501,6 +503,28 @@ void robots(const std::string &urdf) {
 
 } // namespace
 
+/// The warnings of bakes and of robots: all of them, and none.
+static void warnings() {
+    const std::filesystem::path folder = std::filesystem::temp_directory_path() / "cbvh-wrapper";
+    std::filesystem::create_directories(folder);
+    const std::string mesh = (folder / "line.obj").string(), urdf = (folder / "r.urdf").string();
+    std::ofstream(mesh) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n";
+    std::ofstream(urdf) << "<robot><link name='a'><collision><geometry><mesh filename='line.obj'/></geometry></collision></link>"
+                           "<link name='b'/><joint name='j' type='continuous'><parent link='a'/><child link='b'/>"
+                           "<mimic joint='gone'/></joint></robot>";
+    cbvh::BakeOptions options;
+    options.force = true;
+    cbvh::Mesh::bake_files({mesh}, (folder / "line.cbvh").string(), options);
+    const std::vector<std::string> of_bake = cbvh::Mesh::bake_warnings();
+    CHECK(of_bake.size() == 1 && of_bake[0].find("line.obj: line 5: left out a face") != std::string::npos);
+    FAILS(cbvh::Mesh::bake_files({"/no such folder/x.obj"}, mesh), CBVH_SYSTEM, "x.obj");
+    CHECK(cbvh::Mesh::bake_warnings().empty());
+    const std::vector<std::string> of_robot = cbvh::Robot::from_urdf(urdf).warnings();
+    CHECK(of_robot.size() == 2 && of_robot[0].find("joint 'j' mimics 'gone'") != std::string::npos);
+    CHECK(of_robot[1].find("r.urdf: link a: ") != std::string::npos && of_robot[1].find(of_bake[0]) != std::string::npos);
+    std::filesystem::remove_all(folder);
+}
+
 int main(int count, char **arguments) {
     CHECK(count == 2);
     poses();
@@ -513,6 +537,7 @@ int main(int count, char **arguments) {
     scenes();
     shapes();
     robots(std::string(arguments[1]) + "/robot/robot.urdf");
+    warnings();
     // A thread of its own has messages of its own.
     std::thread([] { FAILS(cbvh::Mesh::open(""), CBVH_SYSTEM, ""); }).join();
     std::puts("wrapper: C++ as the header says");

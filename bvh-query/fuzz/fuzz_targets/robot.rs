@@ -11,6 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
         srdf: texts.next().map(|text| ("fuzz.srdf".into(), text)),
         geometry: Geometry::Visual,
         base: Base::Floating,
+        mesh_warnings: Vec::new(),
         links: Vec::new(),
         others: Vec::new(),
         margins: Vec::new(),

@@ -36,14 +36,11 @@ type Text = (OsString, String);
 type LinkRow = (usize, f64, bool);
 /// An obstacle or an attached object: its name, what the caller added, whether it is solid, its link, and its pose.
 type OtherRow = (String, Py<PyAny>, bool, Option<String>, [f64; 16]);
-/// What a robot is made of: the texts, whether shapes are visual, the base, cores, links, others, margins and allowed pairs.
-type Parts = (
-    (Text, Option<Text>, bool, &'static str),
-    (Vec<Mesh>, Vec<LinkRow>),
-    Vec<OtherRow>,
-    Vec<(String, f64)>,
-    Vec<[String; 2]>,
-);
+/// The texts of a robot, whether shapes are visual, the base, and the warnings of its meshes.
+type Texts<Base> = (Text, Option<Text>, bool, Base, Vec<String>);
+/// What a robot is made of: its texts, cores, links, others, margins and allowed pairs.
+type Parts =
+    (Texts<&'static str>, (Vec<Mesh>, Vec<LinkRow>), Vec<OtherRow>, Vec<(String, f64)>, Vec<[String; 2]>);
 
 /// The nearest bodies: whether there are any, the distance and its bounds, both names, and the points in the world.
 type Nearest = (bool, [f64; 3], [String; 2], [[f64; 3]; 2]);
@@ -233,7 +230,13 @@ impl Robot {
             Base::Floating => "floating",
         };
         (
-            (text(parts.urdf), parts.srdf.map(text), parts.geometry == Geometry::Visual, base),
+            (
+                text(parts.urdf),
+                parts.srdf.map(text),
+                parts.geometry == Geometry::Visual,
+                base,
+                parts.mesh_warnings,
+            ),
             (cores.into_iter().map(Mesh::of).collect(), links),
             others,
             parts.margins,
@@ -246,13 +249,13 @@ impl Robot {
     #[expect(clippy::type_complexity, reason = "it is what `parts` returns, with meshes in place of numbers")]
     fn of_parts(
         py: Python<'_>,
-        texts: (Text, Option<Text>, bool, String),
+        texts: Texts<String>,
         links: Vec<(Bound<'_, Mesh>, f64, bool)>,
         others: Vec<(String, Bound<'_, Mesh>, Py<PyAny>, Option<String>, Bound<'_, PyAny>)>,
         margins: Vec<(String, f64)>,
         allowed: Vec<[String; 2]>,
     ) -> PyResult<Self> {
-        let (urdf, srdf, visual, base) = texts;
+        let (urdf, srdf, visual, base, mesh_warnings) = texts;
         let link = |(core, radius, is_solid): (Bound<'_, Mesh>, f64, bool)| {
             let shape = core.get().shape().clone().rounded(radius)?;
             if is_solid { shape.solid() } else { Ok(shape) }
@@ -270,6 +273,7 @@ impl Robot {
             srdf: srdf.map(text),
             geometry: if visual { Geometry::Visual } else { Geometry::Collision },
             base: base_of(&base),
+            mesh_warnings,
             links,
             others: bodies,
             margins,

@@ -246,6 +246,23 @@ class Describing(unittest.TestCase):
         self.assertIn("arm.srdf: line 9, <disable_collisions>: the robot has no link 'of another robot'", warning)
         self.assertEqual((bare.warnings, copy.copy(robot).warnings), ([], [warning]))
 
+    def test_warnings_of_urdf_and_meshes(self):
+        (self.folder / "line.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n")
+        urdf = self.write(
+            "two.urdf",
+            """<robot name="two"><link name="a"><visual><geometry><mesh filename="line.obj"/></geometry></visual></link>
+            <link name="b"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/>
+            <limit lower="1" upper="-1"/><mimic joint="gone"/></joint></robot>""",
+        )
+        robot = cbvh.Robot.from_urdf(urdf)
+        of_joint = ["mimics 'gone', which the robot does not have", "lower limit 1 above the upper limit -1"]
+        for warning, text in zip(robot.warnings, [*of_joint, "no link has a <collision>"], strict=True):
+            self.assertIn(text, warning)
+        visual = cbvh.Robot.from_urdf(urdf, geometry="visual")
+        self.assertIn("line.obj: line 5: left out a face", visual.warnings[2])
+        self.assertEqual((len(visual.warnings), visual.joints, visual.limits.tolist()), (3, ["j"], [[-np.inf, np.inf]]))
+        self.assertEqual(pickle.loads(pickle.dumps(visual)).warnings, visual.warnings)
+
     def test_packages_and_a_cache(self):
         package = self.folder / "ros" / "my_arm"
         (package / "meshes").mkdir(parents=True)

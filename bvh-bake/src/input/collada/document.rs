@@ -231,6 +231,7 @@ mod tests {
         for (text, expected) in [
             ("", "line 1: expected the element <COLLADA>, found the end of the file"),
             ("\n<robot/>", "line 2: expected the element <COLLADA>, found <robot>"),
+            ("\r<robot/>", "line 2: expected the element <COLLADA>, found <robot>"),
             ("<COLLADA>\r<asset>", "line 2: expected </asset>, found the end of the file"),
             ("<COLLADA>\r\n<asset></a>", "line 2: expected </asset>, found </a>"),
             ("<COLLADA/>\n<COLLADA/>", "line 2: expected the end of the file, found <COLLADA>"),

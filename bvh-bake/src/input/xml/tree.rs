@@ -298,8 +298,9 @@ impl<'a, S: Schema> Tree<'a, S> {
 
     /// Returns the line of an offset in the text. A line ends at LF, CR LF or a CR alone.
     pub(crate) fn line_at(&self, at: usize) -> u64 {
-        let before = &self.text.as_bytes()[..at];
-        let lone = before.windows(2).filter(|pair| pair[0] == b'\r' && pair[1] != b'\n').count();
+        let (bytes, before) = (self.text.as_bytes(), &self.text.as_bytes()[..at]);
+        let is_lone = |at: &usize| bytes.get(at + 1) != Some(&b'\n');
+        let lone = memchr::memchr_iter(b'\r', before).filter(is_lone).count();
         (1 + lone + memchr::memchr_iter(b'\n', before).count()) as u64
     }
 

@@ -159,7 +159,7 @@ class Robot:
     ) -> Robot: ...
     @staticmethod
     def of_parts(
-        texts: tuple[_Text, _Text | None, bool, str],
+        texts: tuple[_Text, _Text | None, bool, str, list[str]],
         links: list[tuple[Mesh, float, bool]],
         others: Sequence[tuple[str, Mesh, Any, str | None, ArrayLike]],
         margins: list[tuple[str, float]],
@@ -168,7 +168,7 @@ class Robot:
     def parts(
         self,
     ) -> tuple[
-        tuple[_Text, _Text | None, bool, str],
+        tuple[_Text, _Text | None, bool, str, list[str]],
         tuple[list[Mesh], list[tuple[int, float, bool]]],
         list[tuple[str, Any, bool, str | None, list[float]]],
         list[tuple[str, float]],

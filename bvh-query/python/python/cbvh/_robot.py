@@ -109,8 +109,8 @@ class Robot:
         applied. ``cache`` names a folder for baked meshes.
 
         Meshes must be in the folder above that of the file or below it, in its package, in a package that a ``package://`` path
-        names, or in ``package_dirs``; ``allow_outside=True`` lets the file name any, and glTF meshes any buffers. What is passed
-        over is in `warnings`.
+        names, or in ``package_dirs``; ``allow_outside=True`` lets the file name any, and glTF meshes any buffers. What is read
+        otherwise than may have been meant is in `warnings`.
 
         Raises ValueError for a description that is not as it should be, FileNotFoundError and BakeError for its meshes.
         """
@@ -171,7 +171,8 @@ class Robot:
 
     @property
     def limits(self) -> NDArray[np.float64]:
-        """The lower and upper limit of each joint value, shape (n, 2), infinite where there is none. No question checks them."""
+        """The lower and upper limit of each joint value, shape (n, 2), infinite where there is none. A lower limit above the upper
+        one is none, with a warning. No question checks them."""
         return np.array(self._robot.limits(), dtype=np.float64).reshape(-1, 2)
 
     @property
@@ -181,8 +182,9 @@ class Robot:
 
     @property
     def warnings(self) -> list[str]:
-        """What was passed over when the robot was read and may not be meant so: names in the SRDF that the robot does not have,
-        for example. Each is a sentence that begins with the file and the line."""
+        """What was read otherwise than its author may have meant, one line each, which begins with the file and the line there or
+        the link. Among them are a robot without shapes (see ``geometry``), mimic joints without a joint to follow, limits that are
+        the wrong way round, names in the SRDF that the robot does not have, and what the readers of meshes left out."""
         return self._robot.warnings()
 
     @property
@@ -477,7 +479,7 @@ def _level_of_caller() -> int:
 
 
 def _robot_of(
-    texts: tuple[tuple[str, str], tuple[str, str] | None, bool, str],
+    texts: tuple[tuple[str, str], tuple[str, str] | None, bool, str, list[str]],
     cores: list[Mesh],
     links: list[tuple[int, float, bool]],
     others: list[tuple[str, Mesh, str | None, Floats]],
