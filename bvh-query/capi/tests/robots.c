@@ -587,7 +587,7 @@ static void misuse(void) {
     FAILS(cbvh_robot_from_urdf(NULL, NULL, &made), CBVH_INVALID_ARGUMENT, "path: expected a pointer, found NULL");
     FAILS(cbvh_robot_from_urdf(urdf(), NULL, NULL), CBVH_INVALID_ARGUMENT, "robot: expected a pointer, found NULL");
     FAILS(cbvh_robot_from_urdf(testdata, NULL, &made), CBVH_SYSTEM, "");
-    FAILS(cbvh_robot_from_urdf(in(testdata, "robot/base.obj"), NULL, &made), CBVH_INVALID_ARGUMENT, "expected XML");
+    FAILS(cbvh_robot_from_urdf(in(testdata, "robot/base.obj"), NULL, &made), CBVH_INVALID_ARGUMENT, "expected the element <robot>");
     CHECK(mkfifo(in(scratch, "pipe"), 0600) == 0);
     FAILS(cbvh_robot_from_urdf(in(scratch, "pipe"), NULL, &made), CBVH_SYSTEM, "pipe: expected a regular file");
     char pipe[1000];
