@@ -14,7 +14,7 @@ pub(super) enum Transform {
     /// The columns of a 4x4 matrix.
     Matrix { matrix: [[f32; 4]; 4] },
     /// Scales, then a rotation by a quaternion x, y, z, w, then a translation.
-    Decomposed { translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3] },
+    Decomposed { translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3] },
 }
 
 pub(super) const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
@@ -63,11 +63,9 @@ impl Frame {
     /// Divides a node's own transform.
     fn local(transform: Transform, scales: &mut Scales) -> Self {
         match transform {
-            Transform::Decomposed { translation, rotation, scale } => Self {
-                rotation: of_quaternion(rotation),
-                shape: diagonal(scale.map(f64::from)),
-                translation: translation.map(f64::from),
-            },
+            Transform::Decomposed { translation, rotation, scale } => {
+                Self { rotation: of_quaternion(rotation), shape: diagonal(scale), translation }
+            }
             Transform::Matrix { .. } => Self::of_matrix(&local(transform), scales),
         }
     }
@@ -103,7 +101,7 @@ impl Scales {
     /// Knows the scale 1, and those that nodes of a document state.
     pub(super) fn of(transforms: impl Iterator<Item = Transform>) -> Self {
         Self::stated(transforms.flat_map(|transform| match transform {
-            Transform::Decomposed { scale, .. } => scale.map(f64::from),
+            Transform::Decomposed { scale, .. } => scale,
             Transform::Matrix { .. } => [1.0; 3],
         }))
     }
@@ -197,9 +195,8 @@ fn determinant(m: &Linear) -> f64 {
     m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
 }
 
-/// Returns a rotation. The quaternion is normalised, because its f32 numbers are inexact; that of length 0 turns nothing.
-fn of_quaternion(quaternion: [f32; 4]) -> Linear {
-    let [x, y, z, w] = quaternion.map(f64::from);
+/// Returns a rotation. The quaternion is normalised, because its numbers are inexact; that of length 0 turns nothing.
+fn of_quaternion([x, y, z, w]: [f64; 4]) -> Linear {
     let norm = x * x + y * y + z * z + w * w;
     let s = if norm > 0.0 { 2.0 / norm } else { 0.0 };
     [
@@ -218,8 +215,8 @@ pub(super) fn local(transform: Transform) -> Affine {
         Transform::Decomposed { translation, rotation, scale } => {
             let rotation = of_quaternion(rotation);
             std::array::from_fn(|row| {
-                let [a, b, c] = [0, 1, 2].map(|column| rotation[row][column] * f64::from(scale[column]));
-                [a, b, c, f64::from(translation[row])]
+                let [a, b, c] = [0, 1, 2].map(|column| rotation[row][column] * scale[column]);
+                [a, b, c, translation[row]]
             })
         }
     }
@@ -297,7 +294,7 @@ mod tests {
     /// Scales above a turn are a shear, and that is baked too.
     #[test]
     fn frames_of_children_are_products() {
-        let scale = |scale: [f32; 3]| Transform::Decomposed {
+        let scale = |scale: [f64; 3]| Transform::Decomposed {
             translation: [1.0, 2.0, 3.0],
             rotation: [0.0, 0.0, 0.0, 1.0],
             scale,
@@ -325,6 +322,6 @@ mod tests {
         }
         // A single factor above stays a single factor below, to the bit.
         let frame = world(&[&scale([0.1, 0.1, 0.1]), &turn]);
-        assert_eq!(frame.shape, diagonal([1.0, 1.0, 2.0].map(|s| f64::from(0.1f32) * s)));
+        assert_eq!(frame.shape, diagonal([1.0, 1.0, 2.0].map(|s| 0.1 * s)));
     }
 }

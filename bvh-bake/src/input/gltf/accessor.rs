@@ -1,90 +1,149 @@
 //! Reads the numbers of an accessor, dense or sparse, block by block, and checks every offset against the buffer.
 
 use super::buffer::{Buffers, Bytes};
-use super::schema::{Accessor, ComponentType, Dimensions};
-use crate::error::{Fault, Halt, Place};
+use super::data::{Accessor, ComponentType, Dimensions};
+use super::schema::wrong;
+use crate::error::{Fault, Place};
 
-/// The number of bytes that are read at a time.
-const BLOCK_BYTES: usize = 1 << 18;
+/// The number of bytes that are read at a time from an accessor, if it is the only one.
+pub(super) const BLOCK_BYTES: usize = 1 << 18;
 /// The number of values that are passed on at a time.
-const BLOCK_VALUES: usize = 1 << 14;
+pub(super) const BLOCK_VALUES: usize = 1 << 14;
 
-/// Finds the buffers of an accessor, so that their bytes count.
-pub(super) fn find(accessor: &Accessor, buffers: &mut Buffers) -> Result<(), Fault> {
-    accessor.views().try_for_each(|view| buffers.bytes(view).map(drop))
+/// What an accessor must hold.
+pub(super) struct Wanted {
+    dimensions: Dimensions,
+    /// Whether numbers of a type will do, normalized or not.
+    fits: fn(ComponentType, bool) -> bool,
+    /// The values, for messages.
+    name: &'static str,
+    /// Whether the values are zero if the accessor has none. It may be that they are in an extension that is not known.
+    may_be_zero: bool,
 }
 
-/// Reads positions in the type in which they are stored: f32, or integers under `KHR_mesh_quantization`. Passes them on
-/// in order, some at a time.
-pub(super) fn positions(
-    number: usize,
-    accessor: &Accessor,
-    buffers: &mut Buffers,
-    give: impl FnMut(&mut [[f64; 3]]) -> Result<(), Halt>,
-) -> Result<(), Halt> {
-    if accessor.dimensions != Dimensions::Vec3 || accessor.component_type == ComponentType::U32 {
-        return Err(
-            unexpected(number, accessor, "positions of three f32 or of three 8- or 16-bit integers").into()
-        );
-    }
-    read::<3, _>(number, accessor, buffers, |position| position, give)
+/// Positions, in the type in which they are stored: f32, or integers under `KHR_mesh_quantization`.
+pub(super) const POSITIONS: Wanted = Wanted {
+    dimensions: Dimensions::Vec3,
+    fits: |kind, _| kind == ComponentType::F32 || is_narrow(kind),
+    name: "positions: VEC3 of f32, or of integers of 8 or 16 bits",
+    may_be_zero: false,
+};
+/// What a morph target adds to positions.
+pub(super) const DELTAS: Wanted = Wanted { may_be_zero: true, ..POSITIONS };
+/// Vertex numbers.
+pub(super) const INDICES: Wanted = Wanted {
+    dimensions: Dimensions::Scalar,
+    fits: |kind, normalized| is_unsigned(kind) && !normalized,
+    name: "vertex numbers: SCALAR of u8, u16 or u32",
+    may_be_zero: false,
+};
+/// The joints of a vertex.
+pub(super) const JOINTS: Wanted = Wanted {
+    dimensions: Dimensions::Vec4,
+    fits: |kind, normalized| is_unsigned(kind) && is_narrow(kind) && !normalized,
+    name: "joints: VEC4 of u8 or u16",
+    may_be_zero: false,
+};
+/// The weights of these joints.
+pub(super) const WEIGHTS: Wanted = Wanted {
+    dimensions: Dimensions::Vec4,
+    fits: |kind, normalized| kind == ComponentType::F32 || is_unsigned(kind) && is_narrow(kind) && normalized,
+    name: "weights: VEC4 of f32, normalized u8 or normalized u16",
+    may_be_zero: false,
+};
+/// The matrices that take a skin to its joints.
+pub(super) const MATRICES: Wanted = Wanted {
+    dimensions: Dimensions::Mat4,
+    fits: |kind, _| kind == ComponentType::F32,
+    name: "matrices: MAT4 of f32",
+    may_be_zero: false,
+};
+/// Translations or scales of instances.
+pub(super) const TRANSLATIONS: Wanted = Wanted {
+    dimensions: Dimensions::Vec3,
+    fits: |kind, _| kind == ComponentType::F32,
+    name: "translations or scales: VEC3 of f32",
+    may_be_zero: false,
+};
+/// Rotations of instances, as quaternions.
+pub(super) const ROTATIONS: Wanted = Wanted {
+    dimensions: Dimensions::Vec4,
+    fits: |kind, normalized| kind == ComponentType::F32 || is_narrow(kind) && normalized,
+    name: "rotations: VEC4 of f32, or of normalized integers of 8 or 16 bits",
+    may_be_zero: false,
+};
+
+/// Reads the values of an accessor in order, N numbers each.
+pub(super) struct Reader<'a, const N: usize> {
+    kind: ComponentType,
+    normalized: bool,
+    /// The stored values; `None` if all are zero but for sparse ones.
+    dense: Option<Rows<'a>>,
+    sparse: Option<Sparse<'a>>,
+    /// The values that have been read, and the number of all.
+    first: u64,
+    count: u64,
 }
 
-/// Reads vertex numbers. Passes them on in order, some at a time.
-pub(super) fn indices(
-    number: usize,
-    accessor: &Accessor,
-    buffers: &mut Buffers,
-    mut give: impl FnMut(&[u32]) -> Result<(), Halt>,
-) -> Result<(), Halt> {
-    let is_plain = is_unsigned(accessor.component_type) && !accessor.normalized;
-    if accessor.dimensions != Dimensions::Scalar || !is_plain {
-        return Err(unexpected(number, accessor, "vertex numbers of 8, 16 or 32 bits").into());
-    }
-    // Every index is exact in f64 and in the range of u32.
-    read::<1, _>(number, accessor, buffers, |[index]| index as u32, |indices| give(indices))
-}
-
-fn unexpected(number: usize, accessor: &Accessor, expected: &'static str) -> Fault {
-    let found = format!("accessor {number} of {:?} {:?}", accessor.dimensions, accessor.component_type);
-    Fault::new(Place::File, expected, found)
-}
-
-fn read<const N: usize, T: Clone>(
-    number: usize,
-    accessor: &Accessor,
-    buffers: &mut Buffers,
-    make: impl Fn([f64; N]) -> T,
-    mut give: impl FnMut(&mut [T]) -> Result<(), Halt>,
-) -> Result<(), Halt> {
-    let (kind, normalized) = (accessor.component_type, accessor.normalized);
-    let size = N * width(kind);
-    let value = |bytes: &[u8]| {
-        make(std::array::from_fn(|place| component(kind, normalized, &bytes[place * width(kind)..])))
-    };
-    let count = accessor.count;
-    let mut dense = match accessor.buffer_view {
-        Some(view) => Some(Rows::of(view, accessor.byte_offset, count, size, buffers)?),
-        None => {
-            // The values are zero except for the sparse ones, or they are the fallback of an extension that this reader
-            // does not know.
-            let room = match &accessor.sparse {
-                Some(sparse) => buffers.bytes(sparse.values.buffer_view)?.length,
-                None => 0,
-            };
-            if count > room {
-                return Err(unexpected(number, accessor, "an accessor with a buffer view").into());
-            }
-            None
+impl<'a, const N: usize> Reader<'a, N> {
+    /// Makes a reader of an accessor, which holds blocks of `block_bytes` bytes, but at least one value.
+    pub(super) fn of(
+        number: usize,
+        accessor: &Accessor,
+        wanted: &Wanted,
+        block_bytes: usize,
+        buffers: &mut Buffers<'a>,
+    ) -> Result<Self, Fault> {
+        let (kind, normalized, count) = (accessor.component_type, accessor.normalized, accessor.count);
+        let unfit = |expected: &'static str| {
+            Fault::new(Place::File, expected, format!("{accessor} in accessors[{number}]"))
+        };
+        if accessor.dimensions != wanted.dimensions || !(wanted.fits)(kind, normalized) {
+            return Err(unfit(wanted.name));
         }
-    };
-    let mut sparse = Sparse::of(accessor, size, buffers)?;
-    let mut values = Vec::with_capacity(count.min(BLOCK_VALUES as u64) as usize);
-    let mut first = 0;
-    while first < count {
-        let now = (count - first).min(BLOCK_VALUES as u64) as usize;
+        let mut rows = |view, offset, count, size| {
+            Rows::of(number, Range { view, offset, count, size }, block_bytes, buffers)
+        };
+        let size = N * width(kind);
+        let dense = match accessor.buffer_view {
+            Some(view) => Some(rows(view, accessor.byte_offset, count, size)?),
+            None => None,
+        };
+        let sparse = match &accessor.sparse {
+            None => None,
+            Some(sparse) => {
+                let (at, values, kind) = (&sparse.indices, &sparse.values, sparse.indices.component_type);
+                if !is_unsigned(kind) {
+                    let found = format!("{kind:?} in accessors[{number}]");
+                    return Err(Fault::new(Place::File, "sparse indices of 8, 16 or 32 bits", found));
+                }
+                let indices = rows(at.buffer_view, at.byte_offset, sparse.count, width(kind))?;
+                let values = rows(values.buffer_view, values.byte_offset, sparse.count, size)?;
+                Some(Sparse::of(number, kind, indices, values)?)
+            }
+        };
+        // Zeros take no bytes, so that any number of them may be declared.
+        let room = sparse.as_ref().map_or(0, |sparse| sparse.values.bytes.length);
+        if dense.is_none() && !wanted.may_be_zero && count > room {
+            return Err(unfit("an accessor with a buffer view"));
+        }
+        Ok(Self { kind, normalized, dense, sparse, first: 0, count })
+    }
+
+    /// Reads the next values, at most `most` of them, as `make` makes them of numbers. None are left if there are none.
+    pub(super) fn block<T: Clone>(
+        &mut self,
+        most: usize,
+        values: &mut Vec<T>,
+        make: impl Fn([f64; N]) -> T,
+    ) -> Result<(), Fault> {
+        let (kind, normalized) = (self.kind, self.normalized);
+        let value = |bytes: &[u8]| {
+            make(std::array::from_fn(|place| component(kind, normalized, &bytes[place * width(kind)..])))
+        };
+        let now = (self.count - self.first).min(most as u64) as usize;
         values.clear();
-        match &mut dense {
+        match &mut self.dense {
             Some(rows) => {
                 for _ in 0..now {
                     values.push(value(rows.next()?));
@@ -92,17 +151,21 @@ fn read<const N: usize, T: Clone>(
             }
             None => values.resize(now, make([0.0; N])),
         }
-        if let Some(sparse) = &mut sparse {
-            sparse.replace(first, &mut values, value)?;
+        if let Some(sparse) = &mut self.sparse {
+            sparse.replace(self.first, values, value)?;
         }
-        give(&mut values)?;
-        first += now as u64;
+        self.first += now as u64;
+        match &self.sparse {
+            Some(sparse) if self.first == self.count => sparse.finish(self.count),
+            _ => Ok(()),
+        }
     }
-    sparse.map_or(Ok(()), |sparse| sparse.finish(count))
 }
 
 /// The values of a sparse accessor that replace others.
 struct Sparse<'a> {
+    /// The number of the accessor.
+    number: usize,
     kind: ComponentType,
     indices: Rows<'a>,
     values: Rows<'a>,
@@ -112,19 +175,10 @@ struct Sparse<'a> {
 }
 
 impl<'a> Sparse<'a> {
-    fn of(accessor: &Accessor, size: usize, buffers: &mut Buffers<'a>) -> Result<Option<Self>, Fault> {
-        let Some(sparse) = &accessor.sparse else { return Ok(None) };
-        let (at, replacements, kind) = (&sparse.indices, &sparse.values, sparse.indices.component_type);
-        if !is_unsigned(kind) {
-            let expected = "sparse indices of 8, 16 or 32 bits";
-            return Err(Fault::new(Place::File, expected, format!("{kind:?}")));
-        }
-        let indices = Rows::of(at.buffer_view, at.byte_offset, sparse.count, width(kind), buffers)?;
-        let values =
-            Rows::of(replacements.buffer_view, replacements.byte_offset, sparse.count, size, buffers)?;
-        let mut sparse = Self { kind, indices, values, next: None, last: 0 };
+    fn of(number: usize, kind: ComponentType, indices: Rows<'a>, values: Rows<'a>) -> Result<Self, Fault> {
+        let mut sparse = Self { number, kind, indices, values, next: None, last: 0 };
         sparse.advance()?;
-        Ok(Some(sparse))
+        Ok(sparse)
     }
 
     fn advance(&mut self) -> Result<(), Fault> {
@@ -135,7 +189,7 @@ impl<'a> Sparse<'a> {
         let next = component(self.kind, false, self.indices.next()?) as u64;
         if next < self.last {
             let expected = format!("sparse indices in ascending order, after {}", self.last);
-            return Err(Fault::new(Place::File, expected, next.to_string()));
+            return Err(Fault::new(Place::File, expected, format!("{next} in accessors[{}]", self.number)));
         }
         (self.next, self.last) = (Some(next), next);
         Ok(())
@@ -151,12 +205,12 @@ impl<'a> Sparse<'a> {
     }
 
     /// Checks that nothing is left after `count` values.
-    fn finish(self, count: u64) -> Result<(), Halt> {
+    fn finish(&self, count: u64) -> Result<(), Fault> {
         match self.next {
             None => Ok(()),
             Some(place) => {
                 let expected = format!("sparse indices below {count}");
-                Err(Fault::new(Place::File, expected, place.to_string()).into())
+                Err(Fault::new(Place::File, expected, format!("{place} in accessors[{}]", self.number)))
             }
         }
     }
@@ -167,27 +221,46 @@ struct Rows<'a> {
     bytes: Bytes<'a>,
     /// The offset of the row after those in the block.
     offset: u64,
-    stride: usize,
+    stride: u64,
     size: usize,
     /// The rows that have not been returned.
     left: u64,
+    /// The number of bytes that are read at a time.
+    block_bytes: usize,
     block: Vec<u8>,
     /// The place in the block of the next row, and the number of rows from there on.
     at: usize,
     in_block: usize,
 }
 
+/// The rows of a buffer view that an accessor needs: `count` of `size` bytes, from an offset on.
+struct Range {
+    view: usize,
+    offset: u64,
+    count: u64,
+    size: usize,
+}
+
 impl<'a> Rows<'a> {
-    /// Makes a reader of `count` rows of `size` bytes.
+    /// Makes a reader of rows for an accessor.
     fn of(
-        view: usize,
-        offset: u64,
-        count: u64,
-        size: usize,
+        accessor: usize,
+        Range { view, offset, count, size }: Range,
+        block_bytes: usize,
         buffers: &mut Buffers<'a>,
     ) -> Result<Self, Fault> {
-        let (bytes, found) = (buffers.bytes(view)?, buffers.view(view));
-        let stride = found.byte_stride.unwrap_or(size as u64);
+        let found = buffers.view(view, accessor)?;
+        let bytes = buffers.bytes(view, accessor)?;
+        // A stride of 0 means, in old files, that rows follow each other. Nothing follows a single row.
+        let stride = match found.byte_stride.filter(|&stride| stride > 0 && count > 1) {
+            None => size as u64,
+            Some(stride) if stride >= size as u64 => stride,
+            Some(stride) => {
+                let expected =
+                    format!("byteStride of at least {size}, the bytes of a value of accessors[{accessor}]");
+                return Err(wrong(&expected, &format!("{stride} in bufferViews[{view}]")));
+            }
+        };
         let (start, length) = (found.byte_offset, found.byte_length);
         let is_inside = start.checked_add(length).is_some_and(|end| end <= bytes.length);
         let room = if is_inside { length.saturating_sub(offset) } else { 0 };
@@ -197,10 +270,21 @@ impl<'a> Rows<'a> {
         };
         if needed.is_none_or(|needed| needed > room) {
             let expected = format!("at most {room} bytes, which is what buffer view {view} holds");
-            return Err(Fault::new(Place::File, expected, format!("{count} rows of {stride} bytes")));
+            let found = format!("{count} values, one every {stride} bytes, in accessors[{accessor}]");
+            return Err(Fault::new(Place::File, expected, found));
         }
-        let (offset, stride) = (start + offset, stride as usize);
-        Ok(Self { bytes, offset, stride, size, left: count, block: Vec::new(), at: 0, in_block: 0 })
+        let offset = start.saturating_add(offset);
+        Ok(Self {
+            bytes,
+            offset,
+            stride,
+            size,
+            left: count,
+            block_bytes,
+            block: Vec::new(),
+            at: 0,
+            in_block: 0,
+        })
     }
 
     /// Returns the next row, of which there must be one.
@@ -210,7 +294,7 @@ impl<'a> Rows<'a> {
             self.fill()?;
         }
         let row = self.at..self.at + self.size;
-        self.at += self.stride;
+        self.at += self.stride as usize;
         self.in_block -= 1;
         self.left -= 1;
         Ok(&self.block[row])
@@ -219,11 +303,11 @@ impl<'a> Rows<'a> {
     /// Reads the next rows.
     #[cold]
     fn fill(&mut self) -> Result<(), Fault> {
-        let rows = self.left.clamp(1, (BLOCK_BYTES / self.stride).max(1) as u64) as usize;
-        self.block.resize((rows - 1) * self.stride + self.size, 0);
+        let rows = self.left.clamp(1, (self.block_bytes as u64 / self.stride).max(1));
+        self.block.resize(((rows - 1) * self.stride) as usize + self.size, 0);
         self.bytes.read(self.offset, &mut self.block)?;
-        self.offset += (rows * self.stride) as u64;
-        (self.at, self.in_block) = (0, rows);
+        self.offset += rows * self.stride;
+        (self.at, self.in_block) = (0, rows as usize);
         Ok(())
     }
 }
@@ -232,11 +316,16 @@ fn is_unsigned(kind: ComponentType) -> bool {
     matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
 }
 
+fn is_narrow(kind: ComponentType) -> bool {
+    matches!(kind, ComponentType::I8 | ComponentType::U8 | ComponentType::I16 | ComponentType::U16)
+}
+
 fn width(kind: ComponentType) -> usize {
     match kind {
         ComponentType::I8 | ComponentType::U8 => 1,
         ComponentType::I16 | ComponentType::U16 => 2,
         ComponentType::U32 | ComponentType::F32 => 4,
+        ComponentType::Unknown(_) => unreachable!("no reader is made for a type that is not known"),
     }
 }
 
@@ -250,6 +339,7 @@ fn component(kind: ComponentType, normalized: bool, bytes: &[u8]) -> f64 {
         ComponentType::U32 => {
             (f64::from(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])), f64::from(u32::MAX))
         }
+        ComponentType::Unknown(_) => unreachable!("no reader is made for a type that is not known"),
         ComponentType::F32 => return f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])),
     };
     if normalized { (value / largest).max(-1.0) } else { value }

@@ -3,7 +3,8 @@
 //! Bytes are read where and when an accessor needs them, so that no buffer of a file is in memory.
 
 use super::beside::{Beside, Folder};
-use super::schema::{Document, View};
+use super::data::View;
+use super::schema::{Document, part};
 use crate::error::{Fault, Place, excerpt};
 use crate::input::input_file::RandomAccess;
 use crate::progress::Progress;
@@ -103,15 +104,17 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    pub(super) fn view(&self, view: usize) -> &'a View {
-        &self.document.buffer_views[view]
+    /// Returns a view that an accessor needs.
+    pub(super) fn view(&self, view: usize, accessor: usize) -> Result<&'a View, Fault> {
+        part(&self.document.buffer_views, "bufferViews", view, || format!("accessors[{accessor}].bufferView"))
     }
 
     /// Returns the bytes of a view's buffer, exactly as many as that declares.
-    pub(super) fn bytes(&mut self, view: usize) -> Result<Bytes<'a>, Fault> {
-        let buffer = self.view(view).buffer;
+    pub(super) fn bytes(&mut self, view: usize, accessor: usize) -> Result<Bytes<'a>, Fault> {
+        let buffer = self.view(view, accessor)?.buffer;
+        let user = || format!("bufferViews[{view}].buffer");
+        let declared = part(&self.document.buffers, "buffers", buffer, user)?.byte_length;
         let mut bytes = self.find(buffer)?;
-        let declared = self.document.buffers[buffer].byte_length;
         if bytes.length < declared {
             let expected = format!("{declared} bytes in buffer {buffer}");
             return Err(Fault::new(Place::File, expected, bytes.length.to_string()));

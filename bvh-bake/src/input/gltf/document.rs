@@ -1,6 +1,8 @@
 //! Reads the JSON of a glTF file, which is kept in memory as a whole, after it has been charged.
 
-use super::schema::{self, Document};
+use super::schema::{self, Asset, Document};
+use super::version::Version;
+use super::{data, extensions};
 use crate::error::{Fault, Halt, Place, excerpt, sentence};
 use crate::input::input_file::{InputFile, RandomAccess};
 use crate::progress::Progress;
@@ -16,7 +18,7 @@ const BYTES_PER_COMMA: u64 = 64;
 
 const _: () = {
     assert!(size_of::<schema::Node>() <= BYTES_PER_OBJECT as usize / 3);
-    assert!(size_of::<schema::Accessor>() <= BYTES_PER_OBJECT as usize / 3);
+    assert!(size_of::<data::Accessor>() <= BYTES_PER_OBJECT as usize / 3);
     assert!(size_of::<schema::Primitive>() <= BYTES_PER_OBJECT as usize / 3);
 };
 
@@ -24,6 +26,8 @@ const _: () = {
 pub(super) struct Parsed {
     pub(super) document: Document,
     pub(super) blob: Option<(u64, u64)>,
+    /// The memory that is left.
+    pub(super) left: Allowance,
 }
 
 /// Reads and parses the JSON of a file, if there is memory for it.
@@ -57,8 +61,9 @@ pub(super) fn read(
     let document = parse(&text, blob.is_some())?;
     let buffers = document.buffers.iter().fold(0u64, |sum, buffer| sum.saturating_add(buffer.byte_length));
     let reading = (2 * buffers.min(READING_BYTES)).min(READING_BYTES);
-    memory.require(text.len() as u64 * BYTES_PER_BYTE + objects + commas + reading)?;
-    Ok(Parsed { document, blob })
+    let taken = text.len() as u64 * BYTES_PER_BYTE + objects + commas + reading;
+    memory.require(taken)?;
+    Ok(Parsed { document, blob, left: memory.less(taken) })
 }
 
 /// Finds the chunks of a binary file: the offset and the number of bytes of its JSON and of the embedded bytes.
@@ -99,20 +104,24 @@ fn chunks(
 }
 
 fn parse(text: &[u8], is_binary: bool) -> Result<Document, Fault> {
+    // A byte order mark says that the text is UTF-8, as it must be. Writers of binary files fill the chunk up.
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let is_filler = |byte: &u8| matches!(byte, 0 | 0x1a) || byte.is_ascii_whitespace();
+    let text = &text[..text.iter().rposition(|byte| !is_filler(byte)).map_or(0, |last| last + 1)];
     let document: Document = serde_json::from_slice(text).map_err(|error| {
+        // A file of another version may have other types, and its version says more than they do.
+        if let Some(fault) = Version::of(text).and_then(Version::check) {
+            return fault;
+        }
         let place = if is_binary { Place::File } else { Place::Line(error.line() as u64) };
         Fault::new(place, "a glTF document", sentence(&error.to_string()))
     })?;
-    let changes_triangles = |name: &str| {
-        !["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"]
-            .iter()
-            .any(|kind| name.starts_with(kind))
-            && name != "KHR_mesh_quantization"
-    };
-    if let Some(name) = document.extensions_required.iter().find(|name| changes_triangles(name)) {
-        let expected = "no required extension that changes triangles";
-        return Err(Fault::new(Place::File, expected, excerpt(name.as_bytes())));
+    let Asset { version, min_version } = &document.asset;
+    let version = Version { stated: Some(version.clone()), least: min_version.clone() };
+    if let Some(fault) = version.check() {
+        return Err(fault);
     }
+    extensions::check(&document)?;
     document.check()?;
     Ok(document)
 }

@@ -1,6 +1,12 @@
 //! The parts of a glTF document from which triangles come, as its JSON has them (glTF 2.0 specification, section 5). All others,
-//! such as materials and skins, are skipped.
+//! such as materials, are skipped.
+//!
+//! An accessor and a buffer view are judged when they are read: what no triangle needs may be wrong. The tree of nodes is judged as
+//! a whole.
 
+use super::attributes::{Attribute, Attributes};
+use super::data::{Accessor, Buffer, View};
+use super::whole::{self, Number};
 use crate::error::{Fault, Place};
 use crate::input::frame::Transform;
 use serde::Deserialize;
@@ -12,6 +18,7 @@ pub(super) struct Document {
     pub(super) asset: Asset,
     #[serde(default)]
     pub(super) extensions_required: Vec<String>,
+    #[serde(default, deserialize_with = "whole::maybe")]
     pub(super) scene: Option<usize>,
     #[serde(default)]
     pub(super) scenes: Vec<Scene>,
@@ -19,6 +26,10 @@ pub(super) struct Document {
     pub(super) nodes: Vec<Node>,
     #[serde(default)]
     pub(super) meshes: Vec<Mesh>,
+    #[serde(default)]
+    pub(super) skins: Vec<Skin>,
+    #[serde(default)]
+    pub(super) animations: Vec<Animation>,
     #[serde(default)]
     pub(super) accessors: Vec<Accessor>,
     #[serde(default)]
@@ -28,21 +39,27 @@ pub(super) struct Document {
 }
 
 #[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct Asset {
     pub(super) version: String,
+    /// The least version that a reader must know, which may be less than `version`.
+    pub(super) min_version: Option<String>,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Scene {
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole::list")]
     pub(super) nodes: Vec<usize>,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Node {
     pub(super) name: Option<String>,
+    #[serde(default, deserialize_with = "whole::maybe")]
     pub(super) mesh: Option<usize>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole::maybe")]
+    pub(super) skin: Option<usize>,
+    #[serde(default, deserialize_with = "whole::list")]
     pub(super) children: Vec<usize>,
     /// The columns of a 4x4 matrix, which takes the place of the three fields below.
     matrix: Option<[f32; 16]>,
@@ -50,18 +67,70 @@ pub(super) struct Node {
     /// A quaternion x, y, z, w.
     rotation: Option<[f32; 4]>,
     scale: Option<[f32; 3]>,
+    /// The weights of the morph targets, which take the place of those of the mesh.
+    pub(super) weights: Option<Vec<f32>>,
+    extensions: Option<Box<NodeExtensions>>,
+}
+
+#[derive(Deserialize)]
+struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    instancing: Option<Instancing>,
+    #[serde(rename = "KHR_node_visibility")]
+    visibility: Option<Visibility>,
+    #[serde(rename = "MSFT_lod")]
+    levels: Option<Levels>,
+}
+
+#[derive(Deserialize)]
+struct Instancing {
+    #[serde(default)]
+    attributes: Attributes,
+}
+
+#[derive(Deserialize)]
+struct Visibility {
+    #[serde(default = "visible")]
+    visible: bool,
+}
+
+fn visible() -> bool {
+    true
+}
+
+#[derive(Deserialize)]
+struct Levels {
+    #[serde(default, deserialize_with = "whole::list")]
+    ids: Vec<usize>,
 }
 
 impl Node {
+    /// Returns the attributes of the instances of the node's mesh, if the node has any.
+    pub(super) fn instancing(&self) -> Option<&Attributes> {
+        self.extensions.as_ref()?.instancing.as_ref().map(|instancing| &instancing.attributes)
+    }
+
+    /// Returns whether the node hides itself and those below it.
+    pub(super) fn is_hidden(&self) -> bool {
+        let visibility = self.extensions.as_ref().and_then(|extensions| extensions.visibility.as_ref());
+        visibility.is_some_and(|visibility| !visibility.visible)
+    }
+
+    /// Returns the nodes that show this one with less detail.
+    pub(super) fn levels(&self) -> &[usize] {
+        let levels = self.extensions.as_ref().and_then(|extensions| extensions.levels.as_ref());
+        levels.map_or(&[], |levels| &levels.ids)
+    }
+
     pub(super) fn transform(&self) -> Transform {
         if let Some(matrix) = self.matrix {
             let column = |at: usize| [matrix[at], matrix[at + 1], matrix[at + 2], matrix[at + 3]];
             return Transform::Matrix { matrix: [0, 4, 8, 12].map(column) };
         }
         Transform::Decomposed {
-            translation: self.translation.unwrap_or([0.0; 3]),
-            rotation: self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]),
-            scale: self.scale.unwrap_or([1.0; 3]),
+            translation: self.translation.unwrap_or([0.0; 3]).map(f64::from),
+            rotation: self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]).map(f64::from),
+            scale: self.scale.unwrap_or([1.0; 3]).map(f64::from),
         }
     }
 }
@@ -70,24 +139,95 @@ impl Node {
 pub(super) struct Mesh {
     pub(super) name: Option<String>,
     pub(super) primitives: Vec<Primitive>,
+    /// The weights of the morph targets of each primitive.
+    #[serde(default)]
+    pub(super) weights: Vec<f32>,
 }
 
 #[derive(Deserialize)]
 pub(super) struct Primitive {
     pub(super) attributes: Attributes,
+    #[serde(default, deserialize_with = "whole::maybe")]
     pub(super) indices: Option<usize>,
     #[serde(default)]
     pub(super) mode: Mode,
+    /// What each morph target adds.
+    #[serde(default)]
+    pub(super) targets: Vec<Attributes>,
+}
+
+impl Primitive {
+    /// Returns the accessor of the positions.
+    pub(super) fn position(&self) -> Option<usize> {
+        self.attributes.of(Attribute::Position)
+    }
 }
 
 #[derive(Deserialize)]
-pub(super) struct Attributes {
-    #[serde(rename = "POSITION")]
-    pub(super) position: Option<usize>,
+#[serde(rename_all = "camelCase")]
+pub(super) struct Skin {
+    #[serde(deserialize_with = "whole::list")]
+    pub(super) joints: Vec<usize>,
+    #[serde(default, deserialize_with = "whole::maybe")]
+    pub(super) inverse_bind_matrices: Option<usize>,
+}
+
+/// An animation, of which only what it changes is known.
+#[derive(Deserialize)]
+pub(super) struct Animation {
+    #[serde(default)]
+    channels: Vec<Channel>,
+}
+
+#[derive(Deserialize)]
+struct Channel {
+    target: Option<Target>,
+}
+
+#[derive(Deserialize)]
+struct Target {
+    path: Option<Path>,
+    extensions: Option<TargetExtensions>,
+}
+
+#[derive(Deserialize)]
+struct TargetExtensions {
+    #[serde(rename = "KHR_animation_pointer")]
+    pointer: Option<Pointer>,
+}
+
+#[derive(Deserialize)]
+struct Pointer {
+    pointer: Option<Path>,
+}
+
+/// What an animation changes: a field of a node, or any part of the document by a JSON pointer.
+#[derive(Deserialize)]
+#[serde(from = "String")]
+struct Path {
+    moves: bool,
+}
+
+impl From<String> for Path {
+    fn from(name: String) -> Self {
+        let is_field = matches!(name.as_str(), "translation" | "rotation" | "scale" | "weights");
+        Self { moves: is_field || name.starts_with("/nodes/") || name.starts_with("/meshes/") }
+    }
+}
+
+impl Animation {
+    /// Returns whether the animation moves nodes or changes weights.
+    pub(super) fn moves(&self) -> bool {
+        let moves = |path: &Option<Path>| path.as_ref().is_some_and(|path| path.moves);
+        self.channels.iter().filter_map(|channel| channel.target.as_ref()).any(|target| {
+            let pointer = target.extensions.as_ref().and_then(|extensions| extensions.pointer.as_ref());
+            moves(&target.path) || pointer.is_some_and(|pointer| moves(&pointer.pointer))
+        })
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(try_from = "u32")]
+#[serde(try_from = "Number")]
 pub(super) enum Mode {
     PointsOrLines,
     #[default]
@@ -96,10 +236,10 @@ pub(super) enum Mode {
     TriangleFan = 6,
 }
 
-impl TryFrom<u32> for Mode {
+impl TryFrom<Number> for Mode {
     type Error = String;
 
-    fn try_from(number: u32) -> Result<Self, String> {
+    fn try_from(Number(number): Number) -> Result<Self, String> {
         match number {
             0..=3 => Ok(Self::PointsOrLines),
             4 => Ok(Self::Triangles),
@@ -110,162 +250,49 @@ impl TryFrom<u32> for Mode {
     }
 }
 
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Accessor {
-    pub(super) buffer_view: Option<usize>,
-    #[serde(default)]
-    pub(super) byte_offset: u64,
-    pub(super) component_type: ComponentType,
-    #[serde(default)]
-    pub(super) normalized: bool,
-    pub(super) count: u64,
-    #[serde(rename = "type")]
-    pub(super) dimensions: Dimensions,
-    pub(super) sparse: Option<Sparse>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
-#[serde(try_from = "u32")]
-pub(super) enum ComponentType {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl TryFrom<u32> for ComponentType {
-    type Error = String;
-
-    fn try_from(number: u32) -> Result<Self, String> {
-        Ok(match number {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return Err(format!("componentType {number}, expected 5120 to 5123, 5125 or 5126")),
-        })
-    }
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
-#[serde(rename_all = "UPPERCASE")]
-pub(super) enum Dimensions {
-    Scalar,
-    Vec2,
-    Vec3,
-    Vec4,
-    Mat2,
-    Mat3,
-    Mat4,
-}
-
-/// Values of an accessor that replace others.
-#[derive(Deserialize)]
-pub(super) struct Sparse {
-    pub(super) count: u64,
-    pub(super) indices: SparseIndices,
-    pub(super) values: SparseValues,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SparseIndices {
-    pub(super) buffer_view: usize,
-    #[serde(default)]
-    pub(super) byte_offset: u64,
-    pub(super) component_type: ComponentType,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct SparseValues {
-    pub(super) buffer_view: usize,
-    #[serde(default)]
-    pub(super) byte_offset: u64,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct View {
-    pub(super) buffer: usize,
-    #[serde(default)]
-    pub(super) byte_offset: u64,
-    pub(super) byte_length: u64,
-    pub(super) byte_stride: Option<u64>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Buffer {
-    pub(super) byte_length: u64,
-    /// Data in base64, or a file; none for the bytes embedded in a binary file.
-    pub(super) uri: Option<String>,
-}
-
 impl Document {
-    /// Checks the version, strides, and that all numbers of parts are those of parts that exist.
+    /// Checks that all numbers of the tree of nodes are those of parts that exist.
     pub(super) fn check(&self) -> Result<(), Fault> {
-        if self.asset.version.split('.').next() != Some("2") {
-            return Err(wrong("asset.version 2.0", &self.asset.version));
-        }
-        let below = |list: &str, count: usize, at: usize, user: &str, of: usize, field: &str| {
-            if at < count {
-                return Ok(());
-            }
-            Err(wrong(
-                &format!("a number below {count} of one of the {list}"),
-                &format!("{at} in {user}[{of}].{field}"),
-            ))
+        let nodes = |at: usize, user: &str, of: usize, field: &str| {
+            part(&self.nodes, "nodes", at, || format!("{user}[{of}].{field}")).map(drop)
         };
-        let (nodes, accessors, views) = (self.nodes.len(), self.accessors.len(), self.buffer_views.len());
         if let Some(scene) = self.scene.filter(|&scene| scene >= self.scenes.len()) {
             return Err(wrong(&format!("a scene below {}", self.scenes.len()), &scene.to_string()));
         }
         for (of, scene) in self.scenes.iter().enumerate() {
-            scene.nodes.iter().try_for_each(|&at| below("nodes", nodes, at, "scenes", of, "nodes"))?;
+            scene.nodes.iter().try_for_each(|&at| nodes(at, "scenes", of, "nodes"))?;
         }
         for (of, node) in self.nodes.iter().enumerate() {
-            node.mesh.map_or(Ok(()), |at| below("meshes", self.meshes.len(), at, "nodes", of, "mesh"))?;
-            node.children.iter().try_for_each(|&at| below("nodes", nodes, at, "nodes", of, "children"))?;
-        }
-        for (of, mesh) in self.meshes.iter().enumerate() {
-            for Primitive { attributes, indices, .. } in &mesh.primitives {
-                let mut accessor = attributes.position.into_iter().chain(*indices);
-                accessor.try_for_each(|at| below("accessors", accessors, at, "meshes", of, "primitives"))?;
+            if let Some(at) = node.mesh {
+                part(&self.meshes, "meshes", at, || format!("nodes[{of}].mesh"))?;
             }
-        }
-        for (of, accessor) in self.accessors.iter().enumerate() {
-            let mut used = accessor.views();
-            used.try_for_each(|at| below("bufferViews", views, at, "accessors", of, "bufferView"))?;
-        }
-        for (of, view) in self.buffer_views.iter().enumerate() {
-            below("buffers", self.buffers.len(), view.buffer, "bufferViews", of, "buffer")?;
-            if let Some(stride) = view.byte_stride.filter(|stride| !(4..=252).contains(stride)) {
-                return Err(wrong("byteStride from 4 to 252", &format!("{stride} in bufferViews[{of}]")));
-            }
+            node.children.iter().try_for_each(|&at| nodes(at, "nodes", of, "children"))?;
         }
         Ok(())
     }
-}
 
-impl Accessor {
-    /// The buffer views that the accessor uses.
-    pub(super) fn views(&self) -> impl Iterator<Item = usize> {
-        let sparse = self.sparse.as_ref();
-        let of_sparse = sparse.map(|sparse| [sparse.indices.buffer_view, sparse.values.buffer_view]);
-        self.buffer_view.into_iter().chain(of_sparse.into_iter().flatten())
+    /// Returns the accessor that `user` needs.
+    pub(super) fn accessor(&self, number: usize, user: impl FnOnce() -> String) -> Result<&Accessor, Fault> {
+        part(&self.accessors, "accessors", number, user)
     }
 }
 
-fn wrong(expected: &str, found: &str) -> Fault {
-    Fault::new(
-        Place::File,
-        format!("glTF that follows its schema: {expected}"),
-        crate::error::excerpt(found.as_bytes()),
-    )
+/// Returns a part of the document by its number, which `user` states.
+pub(super) fn part<'a, T>(
+    list: &'a [T],
+    kind: &str,
+    number: usize,
+    user: impl FnOnce() -> String,
+) -> Result<&'a T, Fault> {
+    list.get(number).ok_or_else(|| {
+        wrong(
+            &format!("a number below {} of one of the {kind}", list.len()),
+            &format!("{number} in {}", user()),
+        )
+    })
+}
+
+/// Returns the fault of a document that does not follow the specification.
+pub(super) fn wrong(expected: &str, found: &str) -> Fault {
+    Fault::new(Place::File, format!("glTF that follows its schema: {expected}"), found)
 }

@@ -123,7 +123,8 @@ fn gltf_that_breaks_its_schema_is_refused() {
     assert_eq!(try_bytes(&glb(&plain), MeshFormat::Gltf).unwrap().triangle_count(), 1);
     let scenes = r#"{"scenes":[{"nodes":[0]},{"nodes":[7]}],"#;
     for (from, to, expected) in [
-        (r#""2.0""#, r#""1.0""#, "asset.version 2.0, found 1.0"),
+        (r#""2.0""#, r#""1.0""#, "asset.version 2.0, found glTF of version 1.0; convert it to version 2.0"),
+        (r#""2.0""#, r#""3.0""#, "asset.version 2.0, found 3.0"),
         (r#""asset":{"version":"2.0"},"#, "", "missing field `asset`"),
         (r#"{"mesh":0}"#, r#"{"mesh":1}"#, "1 in nodes[0].mesh"),
         (r#"{"mesh":0}"#, r#"{"mesh":0,"children":[4294967295]}"#, "4294967295 in nodes[0].children"),
@@ -131,16 +132,32 @@ fn gltf_that_breaks_its_schema_is_refused() {
         (r#"{"mesh":0}"#, r#"{"mesh":0,"scale":[1,1]}"#, "invalid length 2"),
         ("{", r#"{"scene":0,"#, "a scene below 0, found 0"),
         ("{", scenes, "7 in scenes[1].nodes"),
-        (r#""POSITION":1"#, r#""POSITION":6"#, "6 in meshes[0].primitives"),
-        (r#""indices":0"#, r#""indices":99"#, "99 in meshes[0].primitives"),
+        (r#""POSITION":1"#, r#""POSITION":6"#, "6 in primitive 0 of meshes[0]"),
+        (r#""indices":0"#, r#""indices":99"#, "99 in primitive 0 of meshes[0]"),
         (r#""indices":0"#, r#""indices":0,"mode":7"#, "mode 7, expected 0 to 6"),
         (r#"{"bufferView":0"#, r#"{"bufferView":9"#, "9 in accessors[0].bufferView"),
-        (r#"{"bufferView":4}"#, r#"{"bufferView":5}"#, "5 in accessors[4].bufferView"),
+        // What is not read is not judged.
+        (r#"{"bufferView":4}"#, r#"{"bufferView":5}"#, ""),
         ("5126", "5124", "componentType 5124"),
-        ("VEC3", "VEC5", "unknown variant `VEC5`"),
+        ("VEC3", "VEC5", "found VEC5 of f32 in accessors[1]"),
         (r#"[{"buffer":0"#, r#"[{"buffer":2"#, "2 in bufferViews[0].buffer"),
-        (r#""byteLength":36"#, r#""byteLength":36,"byteStride":0"#, "0 in bufferViews[1]"),
-        (r#""byteLength":36"#, r#""byteLength":36,"byteStride":256"#, "256 in bufferViews[1]"),
+        (r#""byteLength":36"#, r#""byteLength":36,"byteStride":0"#, ""),
+        (
+            r#""byteLength":36"#,
+            r#""byteLength":36,"byteStride":8"#,
+            "byteStride of at least 12, the bytes of a value of accessors[1], found 8",
+        ),
+        (
+            r#""byteLength":36"#,
+            r#""byteLength":36,"byteStride":256"#,
+            "at most 36 bytes, which is what buffer view 1 holds",
+        ),
+        (r#""byteLength":36"#, r#""byteLength":36,"byteStride":18446744073709551615"#, "at most 36 bytes"),
+        (
+            r#""byteLength":36"#,
+            r#""byteLength":36,"byteStride":-1"#,
+            "invalid value: integer `-1`, expected a whole number from 0",
+        ),
         (r#""byteLength":36"#, r#""byteLength":37"#, ""),
         (r#""byteLength":36"#, r#""byteLength":18446744073709551615"#, "at most 0 bytes"),
     ] {

@@ -5,6 +5,10 @@ mod as_found;
 mod clouds;
 mod collada;
 mod gltf;
+mod gltf_found;
+mod gltf_instances;
+mod gltf_model;
+mod gltf_moved;
 /// Windows lets few users make links, and has no pipes in folders.
 #[cfg(unix)]
 mod named_files;
