@@ -78,7 +78,9 @@ fn chunks(
     };
     let (version, length) = (word(head, 4), u64::from(word(head, 8)));
     if version != 2 {
-        return Err(Fault::new(Place::Byte(4), "binary glTF of version 2", version.to_string()).into());
+        return Err(
+            Fault::new(Place::Byte(4), "binary glTF of version 2", format!("version {version}")).into()
+        );
     }
     if length > length_of_file {
         let expected = format!("a length of at most {length_of_file}");

@@ -37,6 +37,34 @@ impl Model {
         model
     }
 
+    /// Returns a file with a skin, morph targets, instances and what is told.
+    pub(super) fn everything() -> Self {
+        let mut model = Self::new();
+        let joints = model.integers("VEC4", 5121, false, &[0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0]);
+        let weights =
+            model.integers("VEC4", 5121, true, &[127, 128, 0, 0, 0, 0, 0, 0, 255, 0, 0, 0, 9, 9, 0, 0]);
+        let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0, 1.0];
+        let matrices = model.floats("MAT4", &[identity; 2].concat());
+        let sparse = model.sparse(4, &[0, 3], &[-1.0, 0.0, 0.0, 0.0, 0.0, 3.0]);
+        let deltas = model.integers("VEC3", 5120, false, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+        let places = model.floats("VEC3", &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
+        let turns = model.integers("VEC4", 5122, true, &[0, 0, 0, 32767, 0, 0, 32767, 32767]);
+        model.meshes = format!(
+            r#"{{"primitives":[{{"attributes":{{"POSITION":0,"JOINTS_0":{joints},"WEIGHTS_0":{weights}}},"indices":1,
+            "targets":[{{"POSITION":{sparse}}},{{"POSITION":{deltas}}}]}},{{"attributes":{{"POSITION":0}},"mode":1}}],"weights":[0.5,1]}}"#
+        );
+        model.nodes = format!(
+            r#"{{"mesh":0,"skin":0}},{{"children":[2],"scale":[1,2,3]}},{{"translation":[1,2,3]}},{{"mesh":0,"weights":[1,0],"extensions":{{
+            "EXT_mesh_gpu_instancing":{{"attributes":{{"TRANSLATION":{places},"ROTATION":{turns},"SCALE":{places}}}}},
+            "KHR_node_visibility":{{"visible":false}},"MSFT_lod":{{"ids":[4]}}}}}},{{"mesh":0}}"#
+        );
+        model.fields = format!(
+            r#""skins":[{{"joints":[1,2],"inverseBindMatrices":{matrices}}}],"scenes":[{{"nodes":[0,1,3]}}],"scene":0,
+            "animations":[{{"channels":[{{"target":{{"path":"weights"}}}}]}}],"extensionsRequired":["EXT_mesh_gpu_instancing"],"#
+        );
+        model
+    }
+
     /// Adds a buffer view with other fields, such as a stride, and returns its number.
     pub(super) fn view(&mut self, bytes: &[u8], fields: &str) -> usize {
         let (at, length) = (self.buffer.len(), bytes.len());

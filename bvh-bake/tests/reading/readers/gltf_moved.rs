@@ -4,6 +4,7 @@
 
 use super::gltf_model::{Model, PRIMITIVE, Point, corners, near, read, read_scene, told, volume, wrong};
 use super::only;
+use bvh_bake::input::MeshFormat;
 use bvh_bake::{FileBake, Options, Outcome, VerifyOptions, verify_files};
 use std::path::Path;
 
@@ -372,4 +373,46 @@ fn found_files_are_moved() {
     let positions = |name: &str| only(&bvh_bake::input::read(&folder.join(name)).unwrap()).positions.clone();
     assert_eq!(positions("skinned.gltf"), corners().map(|[x, y, z]| [x, y, z + 1.0]));
     assert_eq!(positions("morph-weight-1.gltf")[1..], [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 5.0]]);
+}
+
+#[test]
+fn what_moves_vertices_has_a_limit() {
+    let limited = |model: &Model, expected: &str| {
+        let error = super::try_bytes(&model.glb(), MeshFormat::Gltf).unwrap_err();
+        assert!(error.is_limit(), "{error}");
+        assert!(super::one_line(&error).contains(expected), "{error}");
+    };
+    // Very many targets share what they add.
+    let mut model = Model::new();
+    let positions = model.floats("VEC3", &[0.5; 60_000]);
+    let many = vec![positions; 4000];
+    let ones = vec!["1"; many.len()].join(",");
+    model.meshes = morphed(&many, &format!(r#","weights":[{ones}]"#));
+    model.meshes = model.meshes.replace(r#""POSITION":0}"#, &format!(r#""POSITION":{positions}}}"#));
+    limited(&model, "vertices, indices and names");
+    // Nodes have one of two skins in turn.
+    let (mut model, [_, _, matrices]) = skinned();
+    let joints = vec!["1"; 50_000].join(",");
+    let skin = format!(r#"{{"joints":[{joints}]}}"#);
+    model.fields = format!(r#""skins":[{skin},{skin}],"#);
+    let nodes = [r#"{"mesh":0,"skin":0}"#, r#"{"mesh":0,"skin":1}"#].repeat(1000);
+    model.nodes = format!("{},{{}}", nodes.join(","));
+    limited(&model, "vertices, indices and names");
+    assert!(matrices > 0);
+    // A long chain of bones takes a time in proportion to its length, and weights without any use none.
+    let mut model = Model::new();
+    let [joints, weights] =
+        [model.integers("VEC4", 5121, false, &[0; 16]), model.floats("VEC4", &[0.25; 16])];
+    let long = 100_000;
+    let chain: Vec<_> =
+        (2..long).map(|child| format!(r#"{{"children":[{child}],"translation":[1,0,0]}}"#)).collect();
+    model.nodes = format!(r#"{{"mesh":0,"skin":0}},{},{{}}"#, chain.join(","));
+    let all: Vec<_> = (1..long).rev().map(|joint| joint.to_string()).collect();
+    model.fields = format!(r#""skins":[{{"joints":[{}]}}],"scenes":[{{"nodes":[0]}}],"#, all.join(","));
+    let zeros = vec!["0"; 100_000].join(",");
+    model.meshes = format!(
+        r#"{{"primitives":[{{"attributes":{{"POSITION":0,"JOINTS_0":{joints},"WEIGHTS_0":{weights}}},"indices":1}}],"weights":[{zeros}]}}"#
+    );
+    let far = f64::from(long - 2);
+    near(&only(&read(&model)).positions, &corners().map(|[x, y, z]| [x + far, y, z]));
 }

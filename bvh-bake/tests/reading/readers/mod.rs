@@ -12,6 +12,7 @@ mod gltf_moved;
 /// Windows lets few users make links, and has no pipes in folders.
 #[cfg(unix)]
 mod named_files;
+mod tables;
 
 use bvh_bake::input::{MeshFormat, Place, ReadError, read, read_bytes};
 use bvh_bake::mesh::{Mesh, Object};

@@ -130,7 +130,7 @@ def bake_files(
     with a coordinate that is NaN or infinite, which are otherwise refused. The other options are those of `bake`. The environment
     variable ``RAYON_NUM_THREADS`` sets the number of threads of the module, for bakes and for ``parallel=True``; the
     default is the number of cores. Warns with `BakeWarning` of what the readers did that the authors of the files may
-    not expect, such as bytes or points that they left out. Raises OSError if the system refuses a file, and BakeError
+    not expect, such as bytes, points or animations that they left out. Raises OSError if the system refuses a file, and BakeError
     if a mesh cannot be baked.
     """
     if isinstance(inputs, (str, bytes, os.PathLike)):
