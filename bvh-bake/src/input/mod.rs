@@ -176,8 +176,9 @@ pub fn read_with(path: &Path, up_axis: UpAxis, allow_outside: bool) -> Result<Me
 }
 
 /// Reads a mesh file as a scene, which has instances. In a glTF or COLLADA file, each node with a mesh is an instance. Nodes
-/// share their meshes, and a mesh becomes one object for each scale with which it occurs. In other files, each object is an
-/// instance at its own place. Names that occur again get a number.
+/// share their meshes, and a mesh becomes one object for each scale with which it occurs. A glTF node that repeats its mesh
+/// (`EXT_mesh_gpu_instancing`) is as many instances, a mesh is another one with other weights of its morph targets, and a mesh with a
+/// skin stands in the world. In other files, each object is an instance at its own place. Names that occur again get a number.
 ///
 /// The transform of a node may be a matrix. If it is a rotation with scales to within 2^-22, it is treated as one. If a
 /// scale is within 2^-22 of one that a node states, or of the scale of an earlier matrix, both count as equal, because

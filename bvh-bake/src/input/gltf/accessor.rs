@@ -44,11 +44,11 @@ pub(super) const JOINTS: Wanted = Wanted {
     name: "joints: VEC4 of u8 or u16",
     may_be_zero: false,
 };
-/// The weights of these joints.
+/// The weights of these joints. Integers that are not normalized have the same ratios, and are divided by their sum.
 pub(super) const WEIGHTS: Wanted = Wanted {
     dimensions: Dimensions::Vec4,
-    fits: |kind, normalized| kind == ComponentType::F32 || is_unsigned(kind) && is_narrow(kind) && normalized,
-    name: "weights: VEC4 of f32, normalized u8 or normalized u16",
+    fits: |kind, _| kind == ComponentType::F32 || is_unsigned(kind) && is_narrow(kind),
+    name: "weights: VEC4 of f32, u8 or u16",
     may_be_zero: false,
 };
 /// The matrices that take a skin to its joints.

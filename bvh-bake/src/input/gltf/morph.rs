@@ -50,8 +50,8 @@ impl<'a> Morphs<'a> {
     }
 
     fn of_weights(&mut self, weights: &[f32], stated_in: impl FnOnce() -> String) -> Rc<Morph> {
-        let active: Vec<_> = weights.iter().map(|&weight| f64::from(weight)).enumerate().collect();
-        let active: Vec<_> = active.into_iter().filter(|&(_, weight)| weight != 0.0).collect();
+        let all = weights.iter().map(|&weight| f64::from(weight)).enumerate();
+        let active: Vec<_> = all.filter(|&(_, weight)| weight != 0.0).collect();
         if active.is_empty() {
             return self.none.clone();
         }

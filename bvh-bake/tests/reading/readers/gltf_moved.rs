@@ -236,6 +236,13 @@ fn weights_that_do_not_add_up_are_mended_and_told() {
         told(&mesh, expected);
         near(&only(&mesh).positions, &SKINNED);
     }
+    // Integers that are not said to be normalized.
+    let bytes =
+        model.integers("VEC4", 5121, false, &[255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 0, 99, 99, 0, 0]);
+    model.meshes = mesh.replace(&format!(r#""WEIGHTS_0":{weights}"#), &format!(r#""WEIGHTS_0":{bytes}"#));
+    let found = read(&model);
+    told(&found, &["divided the weights of 4 vertices of skins by their sum, which is not 1"]);
+    near(&only(&found).positions, &SKINNED);
     for value in [f32::NAN, f32::INFINITY, -0.5] {
         with(&mut model, [value, 0.0, 0.0, 0.0]);
         wrong(&model, &format!("finite weights from 0 of the joints of skins[0], found {value:e}"));
