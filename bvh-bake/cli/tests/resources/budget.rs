@@ -338,6 +338,61 @@ fn what_is_kept_counts() {
     }
 }
 
+/// What a glTF file makes the bake keep to find its vertices counts: joints, weights, morph targets, attributes, and the shapes of
+/// instances.
+#[test]
+fn what_moves_vertices_counts() {
+    let directory = &place();
+    let mut buffer: Vec<u8> = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat();
+    buffer.extend([0; 12]);
+    buffer.extend([1.0f32; 12].map(f32::to_le_bytes).as_flattened());
+    let scales = 20_000u32;
+    (0..scales)
+        .for_each(|i| buffer.extend([1.0 + 1e-3 * i as f32, 1.0, 1.0].map(f32::to_le_bytes).as_flattened()));
+    directory.write("b.bin", &buffer);
+    let document = |nodes: &str, attributes: &str, fields: &str| {
+        let view =
+            |at: u32, length: u32| format!(r#"{{"buffer":0,"byteOffset":{at},"byteLength":{length}}}"#);
+        let views = [view(0, 36), view(36, 12), view(48, 48), view(96, 12 * scales)].join(",");
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{nodes}],{fields},
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0{attributes}}}}}]}}],"accessors":[
+            {{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},{{"bufferView":1,"componentType":5121,"count":3,"type":"VEC4"}},
+            {{"bufferView":2,"componentType":5126,"count":3,"type":"VEC4"}},{{"bufferView":3,"componentType":5126,"count":{scales},"type":"VEC3"}}],
+            "bufferViews":[{views}],"buffers":[{{"uri":"b.bin","byteLength":{}}}]}}"#,
+            buffer.len()
+        )
+    };
+    let many = |what: &str, count: usize| vec![what; count].join(",");
+    let plain = r#"{"mesh":0}"#;
+    let skin = r#"{"mesh":0,"skin":0}"#;
+    let joints = format!(r#""skins":[{{"joints":[{}]}}]"#, many("0", 200_000));
+    directory.write("joints.gltf", document(skin, r#","JOINTS_0":1,"WEIGHTS_0":2"#, &joints));
+    let targets = format!(r#"}},"targets":[{}],"extras":{{"#, many(r#"{"POSITION":0}"#, 20_000));
+    let weighted = format!(r#"{{"mesh":0,"weights":[{}]}}"#, many("1", 20_000));
+    directory.write("targets.gltf", document(&weighted, &targets, r#""extras":0"#));
+    let weighted = many(&format!(r#"{{"mesh":0,"weights":[{}]}}"#, many("0.5", 1000)), 200);
+    let targets = format!(r#"}},"targets":[{}],"extras":{{"#, many("{}", 1000));
+    let all: Vec<String> = (0..200).map(|node| node.to_string()).collect();
+    let weights = document(&weighted, &targets, r#""extras":0"#)
+        .replace("[{\"nodes\":[0]}]", &format!("[{{\"nodes\":[{}]}}]", all.join(",")));
+    directory.write("weights.gltf", weights);
+    let own: String = (0..200_000).map(|number| format!(r#","_{number}":0"#)).collect();
+    directory.write("attributes.gltf", document(plain, &own, r#""extras":0"#));
+    let channels = many(r#"{"target":{"node":0,"path":"scale"}}"#, 100_000);
+    directory.write(
+        "channels.gltf",
+        document(plain, "", &format!(r#""animations":[{{"channels":[{channels}]}}]"#)),
+    );
+    for input in ["joints.gltf", "targets.gltf", "weights.gltf", "attributes.gltf", "channels.gltf"] {
+        bakes_at_its_limit(directory, &[input, "-o", "out.cbvh", "-q"]);
+    }
+    let instanced = r#"{"mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"SCALE":3}}}}"#;
+    directory.write("scales.gltf", document(instanced, "", r#""extras":0"#));
+    bakes_at_its_limit(directory, &["scales.gltf", "-o", "out.cbvh", "-q"]);
+    bakes_at_its_limit(directory, &["scales.gltf", "-o", "out.cbvh", "-q", "--scene"]);
+}
+
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let digit = |bits: u32, place: u32| char::from(DIGITS[(bits >> (18 - 6 * place) & 63) as usize]);

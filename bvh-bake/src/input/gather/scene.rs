@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 const FILE_BYTES: u64 = 10;
 /// Bytes of memory per instance, besides its name.
 const BYTES_PER_INSTANCE: u64 = 320;
-/// Bytes of memory per object until its triangles are gathered, besides its name.
-const BYTES_PER_OBJECT: u64 = 64;
+/// Bytes of memory per object until its triangles are gathered, besides its name. Lists that grow have room for twice as many.
+const BYTES_PER_OBJECT: u64 = 160;
 
 /// The objects of a file that have been read so far, and its instances.
 pub(crate) struct SceneFaces<'a> {

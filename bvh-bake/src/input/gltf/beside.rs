@@ -11,6 +11,9 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+/// The most bytes of a URI that may name a file. A longer one is none, but data, for instance.
+const MAX_URI_BYTES: usize = 4096;
+
 /// The folder of a mesh file, and whether names may lead out of it.
 pub(super) struct Folder<'a> {
     path: &'a Path,
@@ -34,6 +37,9 @@ impl<'a> Folder<'a> {
     /// Opens the file that a relative URI names.
     pub(super) fn open(&self, uri: &str) -> Result<Beside, Fault> {
         let refused = |expected: &'static str| Fault::new(Place::File, expected, excerpt(uri.as_bytes()));
+        if uri.len() > MAX_URI_BYTES {
+            return Err(refused("a name of a file of at most 4096 bytes, or a data URI"));
+        }
         let name = decode_percent(uri).ok_or_else(|| refused("a percent-encoded URI"))?;
         if has_scheme(&name) || !is_relative(Path::new(&name)) {
             return Err(refused("a buffer in a file named relative to this one"));

@@ -74,6 +74,10 @@ fn gltf_buffers_are_found_wherever_they_are() {
     for uri in [r#","uri":"/etc/passwd""#, r#","uri":"http://x/y""#, r#","uri":"data:,x""#, ""] {
         refusal(gltf(r#"{"mesh":0}"#, INDEXED, uri).as_bytes(), MeshFormat::Gltf);
     }
+    let long = format!(r#","uri":"dataapplication/octet-stream;base64,{}""#, "A".repeat(5000));
+    let expected =
+        "a name of a file of at most 4096 bytes, or a data URI, found dataapplication/octet-stream;";
+    refused(gltf(r#"{"mesh":0}"#, INDEXED, &long).as_bytes(), MeshFormat::Gltf, expected);
 }
 
 #[test]
