@@ -14,7 +14,7 @@ use super::indexed::IndexedFaces;
 use super::input_file::InputFile;
 use super::polygon::MAX_CORNERS;
 use super::text::{is_filler, words};
-use super::warnings::{LeftOut, tell_short_faces};
+use super::warnings::{LeftOut, SHORT_FACES};
 use super::xyz::tell_dropped;
 use super::{COORDINATE, changed_meanwhile, misfit};
 use crate::error::{Fault, Halt, Place, excerpt};
@@ -466,7 +466,7 @@ impl<'a> Reader<'a> {
 
     /// Warns of what was left out.
     fn tell(&self, header: &Header, end_of_header: Place) {
-        tell_short_faces(&self.short, self.input.warnings());
+        self.short.tell(self.input.warnings(), SHORT_FACES);
         tell_dropped(&self.dropped, self.input);
         if !self.has_faces && header.elements.iter().any(|element| element.name == RANGE_GRID) {
             let told = "read the points of a range_grid, and left out the surface between them";

@@ -45,19 +45,24 @@ impl LeftOut {
         }
     }
 
-    /// Warns of what was left out: "face" and "faces", say, and what is wrong with them.
-    pub(crate) fn tell(&self, warnings: &Warnings, [one, many]: [&str; 2], which: &str) {
-        match (self.count, self.first) {
-            (1, Some(place)) => warnings.add(place, format!("left out a {one} {which}")),
-            (count, Some(place)) => {
-                warnings.add(place, format!("left out {count} {many} {which}, of which this is the first"));
-            }
-            (_, None) => {}
-        }
+    /// Warns of what was left out, given the words for one and for several.
+    pub(crate) fn tell(&self, warnings: &Warnings, words: [&str; 2]) {
+        let (Some(place), Some(counted)) = (self.first, self.counted(words)) else { return };
+        let first = if self.count > 1 { ", of which this is the first" } else { "" };
+        warnings.add(place, format!("left out {counted}{first}"));
+    }
+
+    /// Returns how many were left out, if any were.
+    pub(crate) fn counted(&self, words: [&str; 2]) -> Option<String> {
+        (self.count > 0).then(|| counted(self.count, words))
     }
 }
 
-/// Warns of the faces that have no triangle: points and lines.
-pub(crate) fn tell_short_faces(short: &LeftOut, warnings: &Warnings) {
-    short.tell(warnings, ["face", "faces"], "of fewer than three corners");
+/// The words for faces without a triangle: points and lines.
+pub(crate) const SHORT_FACES: [&str; 2] =
+    ["face of fewer than three corners", "faces of fewer than three corners"];
+
+/// Names a number of things by the words for one and for several.
+pub(crate) fn counted(count: u64, [one, many]: [&str; 2]) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }

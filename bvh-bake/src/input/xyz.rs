@@ -138,7 +138,7 @@ impl<'a> Points<'a> {
 
 /// Warns of points that were left out.
 pub(super) fn tell_dropped(left_out: &LeftOut, input: &InputFile) {
-    left_out.tell(input.warnings(), ["point", "points"], "without a position");
+    left_out.tell(input.warnings(), ["point without a position", "points without a position"]);
 }
 
 /// Returns what was found instead of points.

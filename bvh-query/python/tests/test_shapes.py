@@ -262,7 +262,7 @@ class Files(unittest.TestCase):
             source.write_text("0 0 0\nnan nan nan\n1 0 0\n")
             with self.assertRaisesRegex(cbvh.BakeError, "line 2: .*drop_nan"):
                 cbvh.bake_files(source, output)
-            with self.assertWarnsRegex(cbvh.BakeWarning, "holes.xyz: line 2: left out a point") as caught:
+            with self.assertWarnsRegex(cbvh.BakeWarning, "holes.xyz: line 2: left out 1 point") as caught:
                 mesh = cbvh.bake_files(source, output, drop_nan=True)
             self.assertEqual((mesh.triangle_count, caught.filename), (2, __file__))
             with warnings.catch_warnings():

@@ -414,7 +414,7 @@ fn warnings_are_told_and_points_without_a_position_left_out() {
     refused.failed(3, &["holes.xyz: line 3: expected a finite coordinate", "--drop-nan"]);
     let warnings = [
         "holes.xyz: line 1: 3 points follow this line, which states 2",
-        "holes.xyz: line 3: left out a point without a position",
+        "holes.xyz: line 3: left out 1 point without a position",
     ];
     let lines = warnings.map(|warning| format!("cbvh: warning: {warning}\n")).concat();
     for quiet in [&[][..], &["-q"]] {
@@ -442,5 +442,5 @@ fn warnings_are_told_and_points_without_a_position_left_out() {
     // Meshes that are baked in memory are told of, too.
     directory.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n");
     let asked = cbvh_in(directory, &["query", "a.obj", "a.cbvh", "--mode", "collide"]);
-    assert_eq!(asked.err, "cbvh: warning: a.obj: line 4: left out a face of fewer than three corners\n");
+    assert_eq!(asked.err, "cbvh: warning: a.obj: line 4: left out 1 face of fewer than three corners\n");
 }

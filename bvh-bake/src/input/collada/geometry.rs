@@ -11,6 +11,7 @@ use crate::input::gather::SceneFaces;
 use crate::input::gltf::Sink as _;
 use crate::input::polygon::{Cutter, MAX_CORNERS};
 use crate::input::text;
+use crate::input::warnings::SHORT_FACES;
 use crate::input::xml::Number;
 use crate::limits::MAX_VERTICES;
 use std::collections::HashMap;
@@ -76,7 +77,7 @@ impl<'d, 'a, 's, 'r, P: Fn([f64; 3]) -> [f64; 3]> MeshReader<'d, 'a, 's, 'r, P> 
         for child in document.children(mesh) {
             match document.tag(child) {
                 tag if tag.has_faces() => reader.faces(child)?,
-                Tag::Lines => reader.scene.leave_out("lists of lines"),
+                Tag::Lines => reader.scene.leave_out(["list of lines", "lists of lines"]),
                 Tag::Unknown => return Err(document.unknown(child).into()),
                 _ => {}
             }
@@ -266,7 +267,7 @@ impl<'d, 'a, 's, 'r, P: Fn([f64; 3]) -> [f64; 3]> MeshReader<'d, 'a, 's, 'r, P> 
             [_, _, _, _, ..] => {}
             [a, b, c] => return self.triangle([a, b, c]),
             _ => {
-                self.scene.leave_out("faces of fewer than three corners");
+                self.scene.leave_out(SHORT_FACES);
                 return Ok(());
             }
         }

@@ -313,7 +313,7 @@ impl<'d, 'a> Scene<'d, 'a, '_, '_> {
         for child in document.children(geometry) {
             match document.tag(child) {
                 Tag::Mesh => MeshReader::read(document, child, &place, is_mirrored, self.found)?,
-                Tag::Spline => self.found.leave_out("splines"),
+                Tag::Spline => self.found.leave_out(["spline", "splines"]),
                 Tag::Unknown => return Err(document.unknown(child).into()),
                 _ => {}
             }

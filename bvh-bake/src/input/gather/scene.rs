@@ -7,6 +7,7 @@ use crate::input::gltf::Sink;
 use crate::input::indexed::IndexedFaces;
 use crate::input::mesh::{Instance, Mesh, check_instances, tell_apart};
 use crate::input::names::Names;
+use crate::input::warnings::counted;
 use crate::input::{COORDINATE, Checksums, InputFile, MeshFormat, collada};
 use crate::limits::coordinate_fits;
 use crate::progress::{Step, WHOLE};
@@ -29,7 +30,7 @@ pub(crate) struct SceneFaces<'a> {
     vertices: Vec<u64>,
     instances: Vec<Instance>,
     /// What was read without its faces, and how often.
-    left_out: BTreeMap<&'static str, u64>,
+    left_out: BTreeMap<[&'static str; 2], u64>,
 }
 
 impl<'a> SceneFaces<'a> {
@@ -39,9 +40,9 @@ impl<'a> SceneFaces<'a> {
         Self { resources, faces: IndexedFaces::new(resources), names, vertices, instances, left_out }
     }
 
-    /// Counts what has no triangles.
-    pub(crate) fn leave_out(&mut self, what: &'static str) {
-        *self.left_out.entry(what).or_default() += 1;
+    /// Counts what has no triangles, given the words for one and for several.
+    pub(crate) fn leave_out(&mut self, words: [&'static str; 2]) {
+        *self.left_out.entry(words).or_default() += 1;
     }
 
     /// Adds faces to the last object, each with so many corners.
@@ -53,8 +54,9 @@ impl<'a> SceneFaces<'a> {
     /// Ends the file, and checks what the reader does not: the coordinates that faces use.
     pub(crate) fn finish(&mut self, input: &InputFile) -> Result<(), Halt> {
         self.faces.finish()?;
-        let warn = |(what, count)| input.warnings().add(Place::File, format!("left out {count} {what}"));
-        self.left_out.iter().for_each(warn);
+        for (&words, &count) in &self.left_out {
+            input.warnings().add(Place::File, format!("left out {}", counted(count, words)));
+        }
         let Some((corner, vertex)) = self.faces.first_misfit(None)? else { return Ok(()) };
         let object = self.vertices.partition_point(|&first| first <= u64::from(vertex)) - 1;
         let position = self.faces.sorted_look_up(&[vertex])?;

@@ -4,7 +4,7 @@
 //! count back from their face are therefore listed separately, and get their vertex numbers when the block is appended
 //! to the earlier ones. The parser records only that something is malformed; `faults` finds out what it is.
 
-use super::statements::{Index, Keyword, Statements, read_vertex};
+use super::statements::{Index, Keyword, Kind, Statements, read_vertex};
 use crate::input::polygon::MAX_CORNERS;
 use crate::input::text::{Lines, is_blank, leading_decimal};
 
@@ -25,9 +25,9 @@ pub(super) struct Block {
     /// Positions in `corners`, each with the number of the vertex counted from the first vertex of the block.
     pub(super) relative: Vec<(usize, i64)>,
     pub(super) events: Vec<Event>,
-    /// The number of faces of fewer than three corners, and the line of the first, counted from 1 at the beginning of the block.
-    pub(super) short: u64,
-    pub(super) first_short: u64,
+    /// The number of statements of each kind that are left out, and the line of the first, counted from 1 at the beginning of
+    /// the block.
+    pub(super) left_out: [(u64, u64); Kind::ALL.len()],
     /// The number of lines.
     pub(super) lines: u64,
     /// Whether a vertex is malformed. Nothing after it has been parsed.
@@ -55,13 +55,10 @@ impl Block {
                 Keyword::Face if block.has_wrong_face => {}
                 Keyword::Face => match block.face(operands) {
                     Some(true) => {}
-                    Some(false) => {
-                        block.first_short =
-                            if block.short == 0 { statements.number } else { block.first_short };
-                        block.short += 1;
-                    }
+                    Some(false) => block.leave_out(Kind::ShortFace, statements.number),
                     None => block.has_wrong_face = true,
                 },
+                Keyword::LeftOut(kind) => block.leave_out(kind, statements.number),
                 Keyword::Group if has_objects => {}
                 Keyword::Object | Keyword::Group => {
                     let is_object = keyword == Keyword::Object;
@@ -72,6 +69,12 @@ impl Block {
         }
         block.lines = statements.line_number();
         block
+    }
+
+    fn leave_out(&mut self, kind: Kind, line: u64) {
+        let (count, first) = &mut self.left_out[kind as usize];
+        *first = if *count == 0 { line } else { *first };
+        *count += 1;
     }
 
     /// Adds a face. Returns false if it has fewer than three corners, so that it is left out, and `None` if it is malformed.
@@ -180,7 +183,7 @@ mod tests {
             assert_eq!(block.corners.len(), corners, "{text}");
         }
         let block = Block::parse(b"f 1 2 3\n\nf 1 -2\nf -1 -2 -3\nf\n");
-        assert_eq!((block.short, block.first_short, block.lines), (2, 3, 5));
+        assert_eq!((block.left_out[Kind::ShortFace as usize], block.lines), ((2, 3), 5));
         assert_eq!((block.corners.len(), block.relative.len(), block.has_wrong_face), (6, 3, false));
         let block = Block::parse(b"v 1 1 1\nv 1 x 1\nf 1 1 1");
         assert!(block.has_wrong_vertex && block.corners.is_empty());

@@ -53,7 +53,7 @@ fn find_in<R: Read>(open: impl Fn() -> Result<ByteReader<R>, Halt>) -> Result<()
                 }
                 check_face(count, line, &mut triangles)?;
             }
-            Keyword::Object | Keyword::Group => {}
+            Keyword::Object | Keyword::Group | Keyword::LeftOut(_) => {}
         }
         Ok(true)
     })

@@ -3,7 +3,8 @@
 //! The reader accepts any line ending, a byte order mark, `\` at the end of a `v` or `f` line, faces before their
 //! vertices, negative numbers that count back from the face, missing texture coordinates and normals, and statements
 //! that do not concern triangles. A vertex that is `nan` or beyond the range of f64 or of the format is an error only
-//! if a face uses it. Faces of fewer than three corners are left out and counted. Objects are named by `o`, or by `g` if the file has no `o`; all faces under one name form one
+//! if a face uses it. Faces of fewer than three corners, lines, points, free-form curves and surfaces, and calls of other files
+//! are left out and counted. Objects are named by `o`, or by `g` if the file has no `o`; all faces under one name form one
 //! object.
 //!
 //! A face may use vertices that follow it, so that corners are checked after the whole file has been read. Only a
@@ -16,7 +17,7 @@ mod statements;
 
 use super::byte_reader::ByteReader;
 use super::indexed::IndexedFaces;
-use super::warnings::{LeftOut, Warnings, tell_short_faces};
+use super::warnings::{LeftOut, Warnings};
 use crate::error::{Fault, Halt, Place};
 use crate::input::names::Names;
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
@@ -24,6 +25,7 @@ use crate::storage::resources::Resources;
 use crate::threads::prelude::*;
 use block::{Block, Event};
 use blocks::{BLOCK_BYTES, next_block};
+use statements::Kind;
 use std::io::Read;
 
 /// Bytes of memory per block: its text and its parsed content.
@@ -41,8 +43,8 @@ pub(crate) fn read<R: Read>(
     resources: &Resources,
 ) -> Result<Names, Halt> {
     let names = Names::default();
-    let (triangles, lines, short, has_wrong_face) = (0, 0, LeftOut::default(), false);
-    let mut reading = Reading { faces, names, resources, triangles, lines, short, has_wrong_face };
+    let (triangles, lines, left_out, has_wrong_face) = (0, 0, <[LeftOut; _]>::default(), false);
+    let mut reading = Reading { faces, names, resources, triangles, lines, left_out, has_wrong_face };
     let mut reader = open(true)?;
     reader.skip_mark();
     let again = || open(false);
@@ -74,7 +76,7 @@ pub(crate) fn read<R: Read>(
         }
     }
     reader.finish(Ok(()))?;
-    let Reading { faces, names, triangles, short, has_wrong_face, .. } = reading;
+    let Reading { faces, names, triangles, left_out, has_wrong_face, .. } = reading;
     faces.finish()?;
     let out_of_range = faces.first_out_of_range()?.map(|(place, _)| place);
     // A vertex that the format cannot hold is an error at the first face that uses it, which comes before errors below.
@@ -84,12 +86,11 @@ pub(crate) fn read<R: Read>(
     if has_wrong_face || out_of_range.is_some() {
         return Err(faults::find(again));
     }
-    tell_short_faces(&short, warnings);
+    let kinds = || Kind::ALL.into_iter().map(Kind::words).zip(&left_out);
+    kinds().for_each(|(words, left_out)| left_out.tell(warnings, words));
     if triangles == 0 {
-        let found = match short.count {
-            0 => "none".to_owned(),
-            count => format!("none but {count} of fewer than three corners"),
-        };
+        let mut counted = kinds().filter_map(|(words, left_out)| left_out.counted(words));
+        let found = counted.next().map_or("none".to_owned(), |counted| format!("none but {counted}"));
         return Err(Fault::new(Place::File, "at least one face", found).into());
     }
     Ok(names)
@@ -103,8 +104,8 @@ struct Reading<'a> {
     triangles: u64,
     /// The number of lines.
     lines: u64,
-    /// The faces of fewer than three corners.
-    short: LeftOut,
+    /// What is left out, by its kind.
+    left_out: [LeftOut; Kind::ALL.len()],
     has_wrong_face: bool,
 }
 
@@ -112,7 +113,9 @@ impl Reading<'_> {
     /// Adds a block. Returns false if the block has a malformed vertex or a vertex beyond the limit.
     fn add(&mut self, mut block: Block) -> Result<bool, Halt> {
         let above = self.faces.vertex_count();
-        self.short.add_all(block.short, Place::Line(self.lines + block.first_short));
+        for (left_out, (count, first)) in self.left_out.iter_mut().zip(block.left_out) {
+            left_out.add_all(count, Place::Line(self.lines + first));
+        }
         self.lines += block.lines;
         self.faces.add_vertices(&block.vertices)?;
         if block.has_wrong_vertex || self.faces.vertex_count() > MAX_VERTICES {

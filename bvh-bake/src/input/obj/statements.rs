@@ -1,8 +1,9 @@
-//! Parses the statements of an OBJ file that matter to a mesh: `v`, `f`, `o` and `g`.
+//! Parses the statements of an OBJ file that matter to a mesh: `v`, `f`, `o`, `g`, and those whose content is left out.
 
 use crate::error::{Fault, Place, excerpt};
 use crate::input::polygon::MAX_CORNERS;
 use crate::input::text::{Lines, is_blank, number, words, wrong_number};
+use crate::input::warnings::SHORT_FACES;
 use crate::limits::MAX_TRIANGLES;
 
 /// Reads the first three numbers after `v`. A fourth number is a weight or the first component of a colour.
@@ -58,6 +59,39 @@ pub(super) enum Keyword {
     Face,
     Object,
     Group,
+    LeftOut(Kind),
+}
+
+/// What is left out and counted, because it has no triangles or has them elsewhere.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    ShortFace,
+    LineOrPoint,
+    FreeForm,
+    Call,
+}
+
+impl Kind {
+    pub(super) const ALL: [Self; 4] = [Self::ShortFace, Self::LineOrPoint, Self::FreeForm, Self::Call];
+
+    /// Returns the words for one and for several.
+    pub(super) fn words(self) -> [&'static str; 2] {
+        match self {
+            Self::ShortFace => SHORT_FACES,
+            Self::LineOrPoint => ["statement of lines or points", "statements of lines or points"],
+            Self::FreeForm => ["free-form curve or surface", "free-form curves or surfaces"],
+            Self::Call => ["call of another file", "calls of other files"],
+        }
+    }
+
+    /// Returns the kind of a keyword of several letters.
+    fn of_word(line: &[u8]) -> Option<Self> {
+        match line.split(|&byte| is_blank(byte)).next()? {
+            b"curv" | b"curv2" | b"surf" => Some(Self::FreeForm),
+            b"call" => Some(Self::Call),
+            _ => None,
+        }
+    }
 }
 
 /// Visits the statements, each of which is one line or several lines joined by `\`.
@@ -95,6 +129,7 @@ impl<'a> Statements<'a> {
                 [word] => (*word, &[][..]),
                 // `fo` is the old keyword for a face.
                 [b'f', b'o', next, ..] if is_blank(*next) => (b'f', &line[start + 2..]),
+                [word @ (b'c' | b's'), ..] => (*word, &[][..]),
                 _ => continue,
             };
             let keyword = match word {
@@ -102,7 +137,11 @@ impl<'a> Statements<'a> {
                 b'f' => Keyword::Face,
                 b'o' => Keyword::Object,
                 b'g' => Keyword::Group,
-                _ => continue,
+                b'l' | b'p' => Keyword::LeftOut(Kind::LineOrPoint),
+                _ => match Kind::of_word(&line[start..]) {
+                    Some(kind) => Keyword::LeftOut(kind),
+                    None => continue,
+                },
             };
             self.number = self.lines.number;
             self.line = operands;

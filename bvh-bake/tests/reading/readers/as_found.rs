@@ -208,12 +208,28 @@ fn faces_of_fewer_than_three_corners_are_left_out_and_counted() {
     let far = format!("{CORNERS}f 1 2 3\n{}f 1 2\n", "# far away\n".repeat(200_000));
     assert_eq!(
         warned(far.as_bytes(), MeshFormat::Obj).1,
-        ["line 200006: left out a face of fewer than three corners"]
+        ["line 200006: left out 1 face of fewer than three corners"]
+    );
+    // Others, that have no triangle either, or have them elsewhere.
+    let others =
+        "l 1 2\np 1\nsurf 0 1 0 1 1 2 3\ns off\ncurv2 1 2\ncall other.obj\ncsh -rm x\nl 2 3\ncstype bezier\n";
+    let (mesh, told) = warned(format!("{CORNERS}{others}f 1 2 3\n").as_bytes(), MeshFormat::Obj);
+    assert_eq!(mesh.triangle_count(), 1);
+    let expected = [
+        "line 5: left out 3 statements of lines or points, of which this is the first",
+        "line 7: left out 2 free-form curves or surfaces, of which this is the first",
+        "line 10: left out 1 call of another file",
+    ];
+    assert_eq!(told, expected);
+    refused(
+        format!("{CORNERS}surf 0 1 0 1 1 2 3\n").as_bytes(),
+        MeshFormat::Obj,
+        "expected at least one face, found none but 1 free-form curve or surface",
     );
     refused(
         format!("{CORNERS}f 1 2\n").as_bytes(),
         MeshFormat::Obj,
-        "found none but 1 of fewer than three corners",
+        "found none but 1 face of fewer than three corners",
     );
     refused(
         format!("{CORNERS}f 1 2 3\nf 1 x\n").as_bytes(),

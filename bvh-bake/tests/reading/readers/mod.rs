@@ -112,7 +112,7 @@ fn obj_errors_name_the_line() {
         ("v 0 0\\\n 0\n\nv 0 x 0\n", "test: line 4: expected three numbers after v, found x"),
         (
             "v 0 0 0\r\rf 1 1",
-            "test: expected at least one face, found none but 1 of fewer than three corners",
+            "test: expected at least one face, found none but 1 face of fewer than three corners",
         ),
         ("v 0 0 0\nf 1 0 1", "test: line 2: expected a vertex number from 1 to 1, found 0"),
         ("v 0 0 0\nf 1 1/x 1", "test: line 2: expected vertex numbers such as 7, 7/1 or 7//1, found 1/x"),

@@ -51,7 +51,7 @@ export class App {
             h("h1", {}, "cbvh view"),
             h("p", {}, "Drop a mesh here to look at it, and a second one to ask about both."),
             iconButton("open", "Open files (O)", () => this.drop.choose(), "Open files"),
-            h("p", { class: "muted" }, "OBJ, STL, PLY, GLB or .cbvh. Nothing leaves this page."),
+            h("p", { class: "muted" }, "OBJ, STL, PLY, GLB, COLLADA, XYZ, PCD or .cbvh. Nothing leaves this page."),
         );
         this.view.stageElement.append(this.#invitation);
         const { handles } = this.view;

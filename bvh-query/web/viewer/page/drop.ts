@@ -22,7 +22,7 @@ export class Drop {
             "div",
             {},
             h("strong", {}, "Drop a mesh"),
-            h("span", {}, "OBJ, STL, PLY, GLB or .cbvh. The first becomes A, the next B."),
+            h("span", {}, "OBJ, STL, PLY, GLB, COLLADA, XYZ, PCD or .cbvh. The first becomes A, the next B."),
         ),
     );
 
