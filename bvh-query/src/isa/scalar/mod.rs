@@ -196,6 +196,8 @@ impl Isa for Scalar {
     fn prefetch_line(self, _byte: &u8) {
         // Portable code has no prefetch instruction.
     }
+    /// Not inlined, as on the other backends: a task that runs tasks would else be compiled with all of them.
+    #[inline(never)]
     fn run<T: Task>(self, task: T) -> T::Output {
         task.run(self)
     }
