@@ -1,10 +1,16 @@
-//! The threads of a bake: those of rayon or, without the feature `parallel`, only the caller's. Then rayon's names stand for
-//! loops over iterators of the standard library.
+//! Loops on the threads of a bake: those of rayon's current pool or, without the feature `parallel`, only the caller's.
+//!
+//! All loops but sorts are one, whose body is called through a pointer, so that rayon's code is compiled once and not for each of
+//! them. An item must therefore take longer than such a call, by far: a run of triangles, and not one of them. Results come in
+//! the order of their items.
 
 #[cfg(feature = "parallel")]
-pub(crate) use rayon::{current_num_threads, current_thread_index, join, prelude, scope};
+pub(crate) use rayon::{current_num_threads, current_thread_index, join};
 #[cfg(not(feature = "parallel"))]
-pub(crate) use sequential::{current_num_threads, current_thread_index, join, prelude, scope};
+pub(crate) use sequential::{current_num_threads, current_thread_index, join};
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 #[cfg(not(feature = "parallel"))]
 mod sequential {
@@ -19,85 +25,66 @@ mod sequential {
     pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
         (a(), b())
     }
+}
 
-    pub(crate) struct Scope;
+/// The number of small items that a thread takes at a time.
+const RUN: usize = 1 << 13;
 
-    impl Scope {
-        pub(crate) fn spawn(&self, work: impl FnOnce(&Self)) {
-            work(self);
-        }
+/// Works on each number below `count`.
+pub(crate) fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().for_each(work);
     }
+    #[cfg(not(feature = "parallel"))]
+    (0..count).for_each(work);
+}
 
-    pub(crate) fn scope<R>(work: impl FnOnce(&Scope) -> R) -> R {
-        work(&Scope)
-    }
+/// Returns what is made of each item.
+pub(crate) fn map<T: Send, R: Send>(
+    items: impl IntoIterator<Item = T>,
+    make: impl Fn(T) -> R + Sync,
+) -> Vec<R> {
+    let places: Vec<_> = items.into_iter().map(|item| Mutex::new((Some(item), None))).collect();
+    each(places.len(), &|number| {
+        let item = lock(&places[number]).0.take().expect("each number comes once");
+        let made = make(item);
+        lock(&places[number]).1 = Some(made);
+    });
+    let made = places.into_iter().map(|place| place.into_inner().unwrap_or_else(PoisonError::into_inner).1);
+    made.map(|made| made.expect("each number has come")).collect()
+}
 
-    pub(crate) mod prelude {
-        use std::slice;
+fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
+    place.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
-        pub(crate) trait IntoParallelIterator: IntoIterator + Sized {
-            fn into_par_iter(self) -> Self::IntoIter {
-                self.into_iter()
-            }
+/// Returns the first number below `count` for which a condition holds.
+pub(crate) fn first(count: usize, holds: impl Fn(usize) -> bool + Sync) -> Option<usize> {
+    let least = AtomicUsize::new(usize::MAX);
+    each(count.div_ceil(RUN), &|run| {
+        let start = run * RUN;
+        if start < least.load(Ordering::Relaxed)
+            && let Some(found) = (start..count.min(start + RUN)).find(|&number| holds(number))
+        {
+            least.fetch_min(found, Ordering::Relaxed);
         }
+    });
+    Some(least.into_inner()).filter(|&least| least < usize::MAX)
+}
 
-        impl<T: IntoIterator> IntoParallelIterator for T {}
+/// Changes each item, given its number.
+pub(crate) fn change<T: Send>(items: &mut [T], change: impl Fn(usize, &mut T) + Sync) {
+    map(items.chunks_mut(RUN).enumerate(), |(run, items)| {
+        items.iter_mut().zip(run * RUN..).for_each(|(item, number)| change(number, item));
+    });
+}
 
-        pub(crate) trait IndexedParallelIterator: Iterator + Sized {
-            fn position_first(mut self, found: impl FnMut(Self::Item) -> bool) -> Option<usize> {
-                self.position(found)
-            }
-
-            fn with_min_len(self, _: usize) -> Self {
-                self
-            }
-        }
-
-        impl<T: Iterator> IndexedParallelIterator for T {}
-
-        pub(crate) trait ParallelSlice<T> {
-            fn par_iter(&self) -> slice::Iter<'_, T>;
-            fn par_iter_mut(&mut self) -> slice::IterMut<'_, T>;
-            fn par_chunks(&self, length: usize) -> slice::Chunks<'_, T>;
-            fn par_chunks_mut(&mut self, length: usize) -> slice::ChunksMut<'_, T>;
-            fn par_windows(&self, length: usize) -> slice::Windows<'_, T>;
-            fn par_sort_unstable(&mut self)
-            where
-                T: Ord;
-            fn par_sort_by_key<K: Ord>(&mut self, key: impl FnMut(&T) -> K);
-        }
-
-        impl<T> ParallelSlice<T> for [T] {
-            fn par_iter(&self) -> slice::Iter<'_, T> {
-                self.iter()
-            }
-
-            fn par_iter_mut(&mut self) -> slice::IterMut<'_, T> {
-                self.iter_mut()
-            }
-
-            fn par_chunks(&self, length: usize) -> slice::Chunks<'_, T> {
-                self.chunks(length)
-            }
-
-            fn par_chunks_mut(&mut self, length: usize) -> slice::ChunksMut<'_, T> {
-                self.chunks_mut(length)
-            }
-
-            fn par_windows(&self, length: usize) -> slice::Windows<'_, T> {
-                self.windows(length)
-            }
-
-            fn par_sort_unstable(&mut self)
-            where
-                T: Ord,
-            {
-                self.sort_unstable();
-            }
-
-            fn par_sort_by_key<K: Ord>(&mut self, key: impl FnMut(&T) -> K) {
-                self.sort_by_key(key);
-            }
-        }
-    }
+/// Sorts items, of which equal ones may change places.
+pub(crate) fn sort_unstable<T: Ord + Send>(items: &mut [T]) {
+    #[cfg(feature = "parallel")]
+    rayon::slice::ParallelSliceMut::par_sort_unstable(items);
+    #[cfg(not(feature = "parallel"))]
+    items.sort_unstable();
 }

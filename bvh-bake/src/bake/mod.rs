@@ -18,7 +18,7 @@ use crate::progress::{Progress, Stage, Step};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::resources::Resources;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::topology::TopologyLists;
 use crate::triangles::Gathered;
 use bvh_format::object::{MAX_RADIUS, ObjectRecord};
@@ -149,7 +149,7 @@ impl<'a> Baker<'a> {
     fn add(&mut self, batch: Vec<Gathered>, begin: &mut dyn FnMut(Stage)) -> Result<(), BakeError> {
         let (shared, progress) = (&self.shared, &self.shared.resources.progress);
         begin(Stage::Prepare);
-        let prepared: Vec<_> = batch.into_par_iter().map(|object| Prepared::new(object, shared)).collect();
+        let prepared = threads::map(batch, |object| Prepared::new(object, shared));
         let mut prepared: Vec<Prepared> = prepared.into_iter().collect::<Result<_, _>>()?;
         for object in &mut prepared {
             if let Some(duplicates) = object.duplicates.take() {
@@ -162,7 +162,7 @@ impl<'a> Baker<'a> {
         }
         progress.reach(Step::Bake(Stage::Prepare), self.triangles);
         begin(Stage::Build);
-        let built: Vec<_> = prepared.into_par_iter().map(|object| Built::new(object, shared)).collect();
+        let built = threads::map(prepared, |object| Built::new(object, shared));
         built.into_iter().try_for_each(|object| self.push(object?))?;
         self.shared.resources.progress.reach(Step::Bake(Stage::Build), self.kept);
         Ok(())

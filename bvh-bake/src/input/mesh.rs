@@ -7,7 +7,7 @@ pub use crate::error::InputError;
 use crate::error::excerpt;
 use crate::limits::coordinate_fits;
 pub use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
-use crate::threads::prelude::*;
+use crate::threads;
 pub use bvh_format::instances::Instance;
 use bvh_format::object::MAX_RADIUS;
 use std::collections::{HashMap, HashSet};
@@ -46,7 +46,7 @@ impl Mesh {
     ///
     /// The function checks nothing: see [`Mesh::check`]. Ids beyond 32 bits wrap, which `check` refuses.
     pub fn from_triangles(positions: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Mesh {
-        let triangle_ids = (0..triangles.len()).into_par_iter().map(|id| id as u32).collect();
+        let triangle_ids = (0..triangles.len()).map(|id| id as u32).collect();
         let object = Object { name: String::new(), positions, triangles, triangle_ids };
         let mut mesh = Mesh { objects: vec![object], ..Mesh::default() };
         mesh.drop_negative_zeros();
@@ -67,7 +67,7 @@ impl Mesh {
     pub fn drop_negative_zeros(&mut self) {
         for object in &mut self.objects {
             // -0.0 + 0.0 is 0.0; every other number stays as it is.
-            object.positions.par_iter_mut().for_each(|position| *position = position.map(|c| c + 0.0));
+            threads::change(&mut object.positions, |_, position| *position = position.map(|c| c + 0.0));
         }
     }
 
@@ -133,7 +133,7 @@ impl Mesh {
         }
         if whole.triangles.len() == whole.triangle_ids.len() && !whole.triangle_ids.is_sorted() {
             let mut pairs: Vec<_> = whole.triangle_ids.into_iter().zip(whole.triangles).collect();
-            pairs.par_sort_by_key(|&(id, _)| id);
+            pairs.sort_by_key(|&(id, _)| id);
             (whole.triangle_ids, whole.triangles) = pairs.into_iter().unzip();
         }
         Mesh { objects: vec![whole], instances: Vec::new(), warnings: self.warnings }
@@ -148,12 +148,17 @@ impl Object {
         if self.triangle_ids.len() != self.triangles.len() {
             return Err(ids(format!("{} ids", self.triangle_ids.len())));
         }
-        if let Some(place) = self.triangle_ids.par_windows(2).position_first(|pair| pair[0] >= pair[1]) {
+        let ids_after = self.triangle_ids.get(1..).unwrap_or_default();
+        if let Some(place) =
+            threads::first(ids_after.len(), |place| self.triangle_ids[place] >= ids_after[place])
+        {
             return Err(ids(format!("{} before {}", self.triangle_ids[place], self.triangle_ids[place + 1])));
         }
         let vertices = self.positions.len();
         let out_of_range = |corner: u32| corner as usize >= vertices;
-        if let Some(place) = self.triangles.par_iter().position_first(|t| t.iter().copied().any(out_of_range))
+        let triangles = &self.triangles;
+        if let Some(place) =
+            threads::first(triangles.len(), |place| triangles[place].iter().copied().any(out_of_range))
         {
             let found = self.triangles[place].into_iter().find(|&corner| out_of_range(corner));
             return Err(InputError::Index {
@@ -164,13 +169,13 @@ impl Object {
             });
         }
         // All coordinates almost always fit, and then the triangles need no check.
-        if self.positions.par_iter().all(|position| position.iter().all(|&c| coordinate_fits(c))) {
+        let is_misfit = |vertex: usize| !self.positions[vertex].iter().all(|&c| coordinate_fits(c));
+        if threads::first(vertices, is_misfit).is_none() {
             return Ok(());
         }
         let misfit = |corner: u32| self.positions[corner as usize].into_iter().find(|&c| !coordinate_fits(c));
-        let Some(place) =
-            self.triangles.par_iter().position_first(|t| t.iter().any(|&corner| misfit(corner).is_some()))
-        else {
+        let has_misfit = |place: usize| triangles[place].iter().any(|&corner| misfit(corner).is_some());
+        let Some(place) = threads::first(triangles.len(), has_misfit) else {
             return Ok(());
         };
         let first = self.triangles[place].into_iter().find_map(|corner| Some((corner, misfit(corner)?)));

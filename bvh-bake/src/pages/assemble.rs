@@ -7,7 +7,6 @@ use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
 use crate::threads;
-use crate::threads::prelude::*;
 use crate::topology::TopologyLists;
 use bvh_format::checksum::Hasher;
 use bvh_format::header::{Section, SectionKind, head_bytes, write_header};
@@ -152,7 +151,7 @@ fn in_batches(
             bytes += if piece.in_memory().is_some() { 0 } else { piece.len() };
             batch.push(piece);
         }
-        visit(batch.into_par_iter().map(Piece::take).collect::<Result<_, _>>()?)?;
+        visit(threads::map(batch, Piece::take).into_iter().collect::<Result<_, _>>()?)?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@
 
 use crate::pages::Style;
 use crate::pages::plan::{PagePlan, Place};
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::arena::Arena;
 use crate::tree::arena::ChildKind;
 use crate::triangles::Triangle;
@@ -54,7 +54,7 @@ impl Encoder<'_> {
     pub(crate) fn encode(&self) -> Encoded {
         let parents = self.parents();
         let page = |number| self.page(&self.pages[number], number, &parents[number]);
-        let written: Vec<WrittenPage> = (0..self.pages.len()).into_par_iter().map(page).collect();
+        let written: Vec<WrittenPage> = threads::map(0..self.pages.len(), page);
         let sum = |length: fn(&WrittenPage) -> usize| written.iter().map(length).sum();
         let mut encoded = Encoded {
             pages: Vec::with_capacity(written.len() * PAGE),

@@ -7,7 +7,7 @@
 use crate::error::BakeError;
 use crate::pages::encode::Encoded;
 use crate::storage::{Piece, Spill};
-use crate::threads::prelude::*;
+use crate::threads;
 use bvh_format::page::{NO_PARENT, PAGE, Page, PagePatcher, PagePlace, RootRef};
 use bvh_format::profile::Profile;
 use std::collections::HashMap;
@@ -81,8 +81,7 @@ impl Numbering {
             }
         }
         let pages = parts.iter_mut().flat_map(|pages| pages.as_chunks_mut::<PAGE>().0);
-        let pages: Vec<_> = pages.zip(places).collect();
-        pages.into_par_iter().for_each(|(page, (base, place))| self.put_numbers(page, base, &place));
+        threads::map(pages.zip(places), |(page, (base, place))| self.put_numbers(page, base, &place));
     }
 
     /// Numbers one page. `base` is the number in the file of the first page of the page's part.

@@ -13,7 +13,6 @@ use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
 use crate::threads;
-use crate::threads::prelude::*;
 use crate::topology::MAX_NET;
 use crate::triangles::{Corners, TRIANGLES_PER_PART, TriangleStream, Triangles};
 use bytemuck::{Pod, Zeroable};
@@ -130,10 +129,11 @@ fn drop_single(hashes: &mut Vec<Hashed>) {
         let bit = hashed.hash() as usize & (bits - 1);
         (bit / 64, 1 << (bit % 64))
     };
-    hashes.par_iter().with_min_len(TRIANGLES_PER_PART).for_each(|hashed| {
-        let (word, bit) = place(hashed);
-        if once[word].fetch_or(bit, Relaxed) & bit != 0 {
-            twice[word].fetch_or(bit, Relaxed);
+    threads::map(hashes.chunks(TRIANGLES_PER_PART), |hashes| {
+        for (word, bit) in hashes.iter().map(place) {
+            if once[word].fetch_or(bit, Relaxed) & bit != 0 {
+                twice[word].fetch_or(bit, Relaxed);
+            }
         }
     });
     hashes.retain(|hashed| {
@@ -178,10 +178,10 @@ pub(crate) fn find(
     let mut suspects = Sorter::of_runs(run);
     let batch = 4 * threads::current_num_threads();
     for start in (0..stream.parts()).step_by(batch) {
-        let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
-        let parts: Vec<Vec<Suspect>> =
-            parts.map(|part| of_part(stream, part, &shared)).collect::<Result<_, _>>()?;
-        parts.iter().try_for_each(|part| suspects.extend(part, spill))?;
+        let parts = start..(start + batch).min(stream.parts());
+        for part in threads::map(parts, |part| of_part(stream, part, &shared)) {
+            suspects.extend(&part?, spill)?;
+        }
     }
     let mut dropped = shared;
     dropped.fill(0);

@@ -8,7 +8,7 @@
 //! have treelets of the same width. The random numbers have constant seeds, so that equal meshes get equal choices.
 
 use crate::options::Options;
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::{PacketTriangles, Tree};
 use crate::triangles::{Corners, Triangle};
 use bvh_format::kdop::{DIRECTIONS, DirectionSet, Kdop};
@@ -108,7 +108,7 @@ fn trials(tree: &Tree<PacketTriangles>, triangles: &[Triangle]) -> (Vec<Node>, V
         let corners: Vec<_> = numbers.into_iter().map(|number| triangles[number as usize].corners).collect();
         Node::new(&corners)
     };
-    (places.par_iter().map(node).collect(), trials)
+    (threads::map(&places, node), trials)
 }
 
 /// Chooses what the options leave open for a cloud of points, without trials.
@@ -181,7 +181,7 @@ fn cheapest(trials: &(Vec<Node>, Vec<Trial>), candidates: &[(Profile, f64)]) -> 
 /// Returns how often nodes that are apart overlap, for each direction set.
 fn overlap_rates((nodes, trials): &(Vec<Node>, Vec<Trial>)) -> [f64; 3] {
     let overlaps = |trial: &Trial| trial_overlaps(trial.nodes.map(|node| &nodes[node]), trial);
-    let found: Vec<[bool; 3]> = trials.par_iter().map(overlaps).collect();
+    let found = threads::map(trials, overlaps);
     // One overlap is added to each count, so that no set seems free.
     [0, 1, 2].map(|set| (1 + found.iter().filter(|found| found[set]).count()) as f64 / TRIAL_COUNT as f64)
 }

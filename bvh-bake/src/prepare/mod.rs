@@ -12,7 +12,6 @@ use crate::progress::{Stage, Step};
 use crate::storage::external_sort::Sorter;
 use crate::storage::resources::Resources;
 use crate::threads;
-use crate::threads::prelude::*;
 use crate::tree::{Aabb, Grid, is_one_brick};
 use crate::triangles::placement::Moved;
 use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
@@ -50,7 +49,7 @@ pub(crate) fn measure(
     let measuring = tally(MEASURE_WEIGHT);
     let batch = 4 * threads::current_num_threads();
     for start in (0..stream.parts()).step_by(batch) {
-        let parts = (start..(start + batch).min(stream.parts())).into_par_iter();
+        let parts = start..(start + batch).min(stream.parts());
         let of_part = |part: usize| {
             let (triangles, moved) = stream.measured_part(part)?;
             let (mut bounds, mut centres) = (Aabb::EMPTY, Aabb::EMPTY);
@@ -64,10 +63,10 @@ pub(crate) fn measure(
                 }
             }
             measuring.add(triangles.len() as u64);
-            Ok((moved, bounds, centres, hashes))
+            Ok::<_, BakeError>((moved, bounds, centres, hashes))
         };
-        let parts: Vec<_> = parts.map(of_part).collect::<Result<_, BakeError>>()?;
-        for (part_moved, part_bounds, part_centres, part_hashes) in parts {
+        for part in threads::map(parts, of_part) {
+            let (part_moved, part_bounds, part_centres, part_hashes) = part?;
             moved = moved.joined(part_moved);
             bounds.join(&part_bounds);
             centres.join(&part_centres);

@@ -2,7 +2,7 @@
 
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
-use crate::threads::prelude::*;
+use crate::threads;
 use bytemuck::Pod;
 use std::borrow::Cow;
 use std::cmp::Reverse;
@@ -37,7 +37,7 @@ impl<T: Pod + Ord + Send + Sync> Sorter<T> {
             // A full run is stored only when more records follow, so that a single run stays in memory.
             if self.open.len() == self.run {
                 let mut run = std::mem::take(&mut self.open);
-                run.par_sort_unstable();
+                threads::sort_unstable(&mut run);
                 self.runs.push(spill.put(run)?);
             }
             let (now, later) = records.split_at(records.len().min(self.run - self.open.len()));
@@ -74,7 +74,7 @@ impl<T: Pod + Ord + Send + Sync> Sorter<T> {
 
     /// Sorts the last run, after the last record has been added.
     pub(crate) fn finish(mut self) -> Sorted<T> {
-        self.open.par_sort_unstable();
+        threads::sort_unstable(&mut self.open);
         // All blocks together take no more memory than one run.
         let block = (MAX_READ_BYTES / size_of::<T>()).min(self.run / (self.runs.len() + 1)).max(1);
         Sorted { runs: self.runs, open: self.open, block }

@@ -9,7 +9,7 @@ use super::max_parts;
 use super::nets::Nets;
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::Aabb;
 use crate::triangles::Triangle;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -82,12 +82,12 @@ impl Survey {
     ) -> Result<BrickTopology, BakeError> {
         let order: Vec<u32> = placed.iter().map(|(number, _)| *number).chain(rest.iter().copied()).collect();
         let mut parents = vec![0; order.len()];
-        let runs = order.par_chunks(TRIANGLES_PER_RUN).zip(parents.par_chunks_mut(TRIANGLES_PER_RUN));
-        let open = runs.enumerate().map(|(run, (order, parents))| {
+        let runs = order.chunks(TRIANGLES_PER_RUN).zip(parents.chunks_mut(TRIANGLES_PER_RUN));
+        let open = threads::map(runs.enumerate(), |(run, (order, parents))| {
             let first = (run * TRIANGLES_PER_RUN) as u32;
             run_of_triangles(order.iter().map(|&number| &triangles[number as usize]), parents, first)
         });
-        let open = open.collect::<Vec<_>>().concat();
+        let open = open.concat();
         let mut parents = Sets(parents);
         let mut edges = count_together(&open, |a, b| parents.join(a, b));
         // The sets are numbered by their first triangles, which have the least places.

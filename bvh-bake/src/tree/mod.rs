@@ -12,6 +12,7 @@ mod binary;
 mod binned;
 mod boxes;
 mod bricks;
+mod lanes;
 mod reinsert;
 mod swept;
 pub(crate) mod treelets;
@@ -23,7 +24,6 @@ use crate::progress::{Stage, Step, Tally, WHOLE};
 use crate::storage::Stream;
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
 use crate::threads;
-use crate::threads::prelude::*;
 use crate::triangles::{Kept, Triangle};
 pub(crate) use binary::Tree;
 pub(crate) use boxes::Aabb;
@@ -43,9 +43,6 @@ const TREES_WEIGHT: u64 = 9;
 pub(crate) fn is_one_brick(triangles: u64) -> bool {
     triangles <= MAX_BRICK_TRIANGLES as u64
 }
-
-/// The least number of references that a thread makes at a time.
-const REFERENCES_PER_TASK: usize = 1 << 13;
 
 /// The most children of a treelet in any profile.
 pub(crate) const MAX_CHILDREN: usize = 8;
@@ -189,7 +186,7 @@ impl Bricks {
         };
         // One loop per brick that may be in memory. A thread that waits for another may run a second loop, but only loops
         // start bricks.
-        threads::scope(|scope| (0..resources.bricks.min(count)).for_each(|_| scope.spawn(|_| work())));
+        threads::each(resources.bricks.min(count), &|_| work());
         // Bricks after one that failed are not made.
         let results = made.into_iter().filter_map(|made| locked(&made).take());
         let results: Vec<T> = results.collect::<Result<_, _>>()?;
@@ -265,12 +262,12 @@ impl Builder {
 
     /// Builds the tree by splits, before any subtree is moved.
     fn split_tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
-        let reference =
-            |(number, triangle): (usize, &Triangle)| Reference::new(number as u32, &triangle.corners);
+        let none = || vec![Reference::NONE; triangles.len()];
+        let (mut references, mut scratch) = threads::join(none, none);
         // On all threads: for a cloud, whose other steps are short, this is a fifth of the bake.
-        let references = triangles.par_iter().with_min_len(REFERENCES_PER_TASK).enumerate().map(reference);
-        let (mut references, mut scratch): (Vec<Reference>, _) =
-            threads::join(|| references.collect(), || vec![Reference::NONE; triangles.len()]);
+        threads::change(&mut references, |number, reference| {
+            *reference = Reference::new(number as u32, &triangles[number].corners);
+        });
         self.brick(&mut references, &mut scratch)
     }
 }

@@ -6,7 +6,7 @@
 //! the cut hardly matters. Of equal costs, the one with more opened nodes is taken. The tree above the bricks is cut in
 //! the same way, with bricks as leaves.
 
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::MAX_CHILDREN;
 use crate::tree::PacketTriangles;
 use crate::tree::arena::{Arena, Child, ChildKind, TreeletIndex};
@@ -16,9 +16,6 @@ use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::{PACKET, Packet};
 use bvh_format::page::TightBound;
-
-/// Children whose k-DOPs one thread fits at a time.
-const CHILDREN_PER_TASK: usize = 2048;
 
 /// The fixed cost of a treelet, in mean sizes of nodes with two leaves.
 const TREELET_COST: f64 = 1.0;
@@ -34,14 +31,12 @@ pub(crate) fn cut_brick(
 ) -> Arena {
     let leaf = |packet| Child { bound: TightBound::EMPTY, kind: ChildKind::Leaf(packet) };
     let mut arena = cut(tree, width, leaf);
-    arena.children_mut().par_chunks_mut(CHILDREN_PER_TASK).for_each(|children| {
-        for child in children {
-            if let ChildKind::Leaf(packet) = &mut child.kind {
-                if in_order_of_lanes {
-                    *packet = packet.in_order_of_lanes(triangles);
-                }
-                child.bound.kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
+    threads::change(arena.children_mut(), |_, child| {
+        if let ChildKind::Leaf(packet) = &mut child.kind {
+            if in_order_of_lanes {
+                *packet = packet.in_order_of_lanes(triangles);
             }
+            child.bound.kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
         }
     });
     arena.join_kdops(slabs);

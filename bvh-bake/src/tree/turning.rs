@@ -4,7 +4,7 @@
 //! cancel. Patches are fitted from the leaves up: normals add up, and the slab of each patch is measured from all its
 //! triangles.
 
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::tree::PacketTriangles;
 use crate::tree::arena::{Arena, ChildKind};
 use crate::tree::treelets::packet_of;
@@ -18,15 +18,11 @@ type Vector = [f64; 3];
 pub(crate) fn fit(arena: &mut Arena, triangles: &[Triangle]) {
     let largest = largest_patches(arena);
     let arena_read = &*arena;
-    let fitted: Vec<_> = largest
-        .par_iter()
-        .map(|&place| {
-            let mut patches =
-                Patches { arena: arena_read, triangles, packets: Vec::new(), fitted: Vec::new() };
-            patches.fit(place);
-            patches.fitted
-        })
-        .collect();
+    let fitted = threads::map(largest, |place| {
+        let mut patches = Patches { arena: arena_read, triangles, packets: Vec::new(), fitted: Vec::new() };
+        patches.fit(place);
+        patches.fitted
+    });
     for (place, slab) in fitted.into_iter().flatten() {
         arena.children_mut()[place].bound.turning = Some(slab);
     }

@@ -5,7 +5,6 @@ use crate::error::BakeError;
 use crate::progress::Tally;
 use crate::storage::{Spill, Stream};
 use crate::threads;
-use crate::threads::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -17,13 +16,12 @@ pub(crate) fn fold<A: Send>(
     add: impl Fn(&mut A, usize) -> Result<(), BakeError> + Sync,
 ) -> Result<Vec<A>, BakeError> {
     let run = parts.div_ceil(threads::current_num_threads()).max(1);
-    let starts: Vec<usize> = (0..parts).step_by(run).collect();
     let of_run = |start: usize| {
         let mut sum = new();
         (start..(start + run).min(parts)).try_for_each(|part| add(&mut sum, part))?;
         Ok(sum)
     };
-    starts.into_par_iter().map(of_run).collect()
+    threads::map((0..parts).step_by(run), of_run).into_iter().collect()
 }
 
 /// The triangles of a part in groups, each in the order of the part. The triangles themselves are not moved.
@@ -87,14 +85,15 @@ pub(crate) fn distribute<'a>(
     // Only this many parts are in memory at the same time.
     let batch = 4 * threads::current_num_threads();
     for start in (0..parts).step_by(batch) {
-        let made = (start..(start + batch).min(parts)).into_par_iter().map(&make);
-        let made: Vec<Grouped> = made.collect::<Result<_, _>>()?;
-        streams.par_iter_mut().enumerate().try_for_each(|(group, stream)| {
+        let made = threads::map(start..(start + batch).min(parts), &make);
+        let made = made.into_iter().collect::<Result<Vec<Grouped>, _>>()?;
+        let append = |(group, stream): (usize, &mut _)| {
             made.iter().try_for_each(|part| part.append_to(group, stream, spill))
-        })?;
+        };
+        threads::map(streams.iter_mut().enumerate(), append).into_iter().collect::<Result<(), _>>()?;
         tally.add(made.iter().map(|part| part.triangles.len() as u64).sum());
     }
-    streams.par_iter_mut().try_for_each(|stream| stream.finish(spill))
+    threads::map(streams, |stream| stream.finish(spill)).into_iter().collect()
 }
 
 /// The triangles of a finished stream.

@@ -6,7 +6,7 @@ use super::placement::{Moved, Placement};
 use super::{TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
-use crate::threads::prelude::*;
+use crate::threads;
 use std::borrow::Cow;
 
 /// A part of the input as it was read.
@@ -88,7 +88,7 @@ impl TriangleStream {
             drop(part);
             Ok((Part::Narrow(spill.put(triangles)?), moved))
         };
-        let placed = parts.into_par_iter().map(place).collect::<Result<Vec<_>, BakeError>>()?;
+        let placed = threads::map(parts, place).into_iter().collect::<Result<Vec<_>, BakeError>>()?;
         let moved = placed.iter().fold(Moved::default(), |all, (_, moved)| all.joined(*moved));
         let parts = placed.into_iter().map(|(part, _)| part).collect();
         Ok((Self { parts, count, placement: None }, moved))

@@ -10,7 +10,6 @@ mod backward;
 
 use crate::progress::Progress;
 use crate::threads;
-use crate::threads::prelude::*;
 use bvh_format::Layout;
 use bvh_format::bounds::Inflation;
 use bvh_format::source::Source;
@@ -37,9 +36,7 @@ impl Workers for InParallel {
         pages: Range<u32>,
         check: impl Fn(u32) -> Result<T, E> + Sync + Send,
     ) -> Result<Vec<T>, E> {
-        // A parallel `collect` into a result would return any of the errors, not always the same one.
-        let results: Vec<_> = pages.into_par_iter().map(check).collect();
-        results.into_iter().collect()
+        threads::map(pages, check).into_iter().collect()
     }
 }
 

@@ -8,7 +8,6 @@ use crate::input::names::Names;
 use crate::input::polygon::Cutter;
 use crate::progress::Tally;
 use crate::threads;
-use crate::threads::prelude::*;
 
 /// The number of faces that one thread cuts at a time.
 const FACES_PER_TASK: usize = 1 << 12;
@@ -109,7 +108,8 @@ impl Triangles {
         if faces.len() < FACES_PER_TASK {
             return Ok(Self::Cut(cut(&faces)?));
         }
-        let cut: Result<Vec<Vec<[u32; 3]>>, Fault> = faces.par_chunks(FACES_PER_TASK).map(cut).collect();
+        let cut: Result<Vec<Vec<[u32; 3]>>, Fault> =
+            threads::map(faces.chunks(FACES_PER_TASK), cut).into_iter().collect();
         Ok(Self::Cut(cut?.concat()))
     }
 

@@ -25,7 +25,7 @@ use crate::limits::MAX_TRIANGLES;
 use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
 use crate::storage::{Piece, Spill};
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::triangles::placement::{Extent, Placement};
 use crate::triangles::{Gathered, Part, TRIANGLES_PER_PART, Triangle, TriangleStream, WideTriangle};
 use input_order::ObjectRuns;
@@ -311,7 +311,7 @@ impl<'a> Gatherer<'a> {
             (done..count).step_by(TRIANGLES_PER_PART).take_while(|start| count - start >= TRIANGLES_PER_PART);
         let full: Vec<usize> = full.collect();
         for batch in full.chunks(self.resources.reading_tasks(BYTES_PER_OPEN_PART)) {
-            let filled = batch.par_iter().map(|&start| {
+            let filled = threads::map(batch, |&start| {
                 let places = start..start + TRIANGLES_PER_PART;
                 let (mut extent, mut is_cloud) = (Extent::EMPTY, true);
                 let mut measured = |place: usize| {
@@ -325,7 +325,8 @@ impl<'a> Gatherer<'a> {
                 };
                 Ok::<_, BakeError>((part, extent, is_cloud))
             });
-            for (part, extent, is_cloud) in filled.collect::<Result<Vec<_>, _>>()? {
+            for filled in filled {
+                let (part, extent, is_cloud) = filled?;
                 body.parts.push(part);
                 body.is_cloud &= is_cloud;
                 body.extent = body.extent.joined(extent);

@@ -6,7 +6,7 @@ use crate::input::stl;
 use crate::limits::MAX_VERTICES;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
-use crate::threads::prelude::*;
+use crate::threads;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Passes solids to a gatherer.
@@ -83,13 +83,11 @@ impl PositionCounter {
         count: usize,
         corners_of: &(impl Fn(usize) -> [[f64; 3]; 3] + Sync),
     ) -> Result<(), BakeError> {
-        let tasks: Vec<usize> = (0..count).step_by(TASK_TRIANGLES).collect();
-        let of_task = |&start: &usize| {
+        let of_task = |start: usize| {
             let triangles = start..(start + TASK_TRIANGLES).min(count);
             distinct_of_late(triangles.flat_map(corners_of))
         };
-        let found: Vec<Distinct> = tasks.par_iter().map(of_task).collect();
-        for (narrow, wide) in found {
+        for (narrow, wide) in threads::map((0..count).step_by(TASK_TRIANGLES), of_task) {
             self.narrow.extend(&narrow, &self.spill)?;
             self.wide.extend(&wide, &self.spill)?;
         }

@@ -22,7 +22,7 @@ use crate::error::{Fault, Halt, Place};
 use crate::input::names::Names;
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 use crate::storage::resources::Resources;
-use crate::threads::prelude::*;
+use crate::threads;
 use block::{Block, Event};
 use blocks::{BLOCK_BYTES, next_block};
 use statements::Kind;
@@ -65,8 +65,7 @@ pub(crate) fn read<R: Read>(
         if texts.is_empty() && !is_too_long {
             break;
         }
-        let blocks: Vec<Block> = texts.into_par_iter().map(|text| Block::parse(&text)).collect();
-        for block in blocks {
+        for block in threads::map(texts, |text| Block::parse(&text)) {
             if !reading.add(block)? {
                 return Err(faults::find(again));
             }

@@ -15,7 +15,7 @@ use super::{COORDINATE, next_ids, text};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::input::mesh::{Mesh, Object};
 use crate::limits::{MAX_VERTICES, coordinate_fits};
-use crate::threads::prelude::*;
+use crate::threads;
 use crate::triangles::TRIANGLES_PER_PART;
 use leftover::Leftover;
 use memchr::memchr;
@@ -130,7 +130,7 @@ fn read_binary<R: Read>(
         let bytes = reader.peek(now * TRIANGLE);
         let triangles = bytes.as_chunks::<TRIANGLE>().0;
         let at = |place: usize| HEAD as u64 + (before + place) as u64 * TRIANGLE as u64;
-        let misfit = triangles.par_iter().position_first(|triangle| first_misfit(triangle).is_some());
+        let misfit = threads::first(triangles.len(), |place| first_misfit(&triangles[place]).is_some());
         if let Some(place) = misfit {
             let (corner, value) = first_misfit(&triangles[place]).unwrap_or_default();
             let byte = at(place) + 12 + 4 * corner as u64;
