@@ -1,17 +1,80 @@
 //! Loops on the threads of a bake: those of rayon's current pool or, without the feature `parallel`, only the caller's.
 //!
-//! All loops but sorts are one, whose body is called through a pointer, so that rayon's code is compiled once and not for each of
-//! them. An item must therefore take longer than such a call, by far: a run of triangles, and not one of them. Results come in
-//! the order of their items.
+//! All parallel loops but sorts are one, whose body is called through a pointer, so that rayon's code is compiled once and not for
+//! each of them. An item must therefore take longer than such a call, by far: a run of triangles, and not one of them. Results
+//! come in the order of their items.
 
 #[cfg(feature = "parallel")]
-pub(crate) use rayon::{current_num_threads, current_thread_index, join};
+pub(crate) use parallel::{current_num_threads, current_thread_index, each, first, join, map, sort_unstable};
 #[cfg(not(feature = "parallel"))]
-pub(crate) use sequential::{current_num_threads, current_thread_index, join};
+pub(crate) use sequential::{
+    current_num_threads, current_thread_index, each, first, join, map, sort_unstable,
+};
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+/// The number of small items that a thread takes at a time.
+const RUN: usize = 1 << 13;
 
+/// Changes each item, given its number.
+pub(crate) fn change<T: Send>(items: &mut [T], change: impl Fn(usize, &mut T) + Sync) {
+    map(items.chunks_mut(RUN).enumerate(), |(run, items)| {
+        items.iter_mut().zip(run * RUN..).for_each(|(item, number)| change(number, item));
+    });
+}
+
+#[cfg(feature = "parallel")]
+mod parallel {
+    use super::RUN;
+    use rayon::prelude::*;
+    pub(crate) use rayon::{current_num_threads, current_thread_index, join};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Mutex, MutexGuard, PoisonError};
+
+    /// Works on each number below `count`.
+    pub(crate) fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
+        (0..count).into_par_iter().for_each(work);
+    }
+
+    /// Returns what is made of each item.
+    pub(crate) fn map<T: Send, R: Send>(
+        items: impl IntoIterator<Item = T>,
+        make: impl Fn(T) -> R + Sync,
+    ) -> Vec<R> {
+        let places: Vec<_> = items.into_iter().map(|item| Mutex::new((Some(item), None))).collect();
+        each(places.len(), &|number| {
+            let item = lock(&places[number]).0.take().expect("each number comes once");
+            let made = make(item);
+            lock(&places[number]).1 = Some(made);
+        });
+        let made =
+            places.into_iter().map(|place| place.into_inner().unwrap_or_else(PoisonError::into_inner).1);
+        made.map(|made| made.expect("each number has come")).collect()
+    }
+
+    fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
+        place.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the first number below `count` for which a condition holds.
+    pub(crate) fn first(count: usize, holds: impl Fn(usize) -> bool + Sync) -> Option<usize> {
+        let least = AtomicUsize::new(usize::MAX);
+        each(count.div_ceil(RUN), &|run| {
+            let start = run * RUN;
+            if start < least.load(Ordering::Relaxed)
+                && let Some(found) = (start..count.min(start + RUN)).find(|&number| holds(number))
+            {
+                least.fetch_min(found, Ordering::Relaxed);
+            }
+        });
+        Some(least.into_inner()).filter(|&least| least < usize::MAX)
+    }
+
+    /// Sorts items, of which equal ones may change places.
+    pub(crate) fn sort_unstable<T: Ord + Send>(items: &mut [T]) {
+        items.par_sort_unstable();
+    }
+}
+
+/// The same on one thread.
 #[cfg(not(feature = "parallel"))]
 mod sequential {
     pub(crate) fn current_num_threads() -> usize {
@@ -25,66 +88,20 @@ mod sequential {
     pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
         (a(), b())
     }
-}
 
-/// The number of small items that a thread takes at a time.
-const RUN: usize = 1 << 13;
-
-/// Works on each number below `count`.
-pub(crate) fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        (0..count).into_par_iter().for_each(work);
+    pub(crate) fn each(count: usize, work: &dyn Fn(usize)) {
+        (0..count).for_each(work);
     }
-    #[cfg(not(feature = "parallel"))]
-    (0..count).for_each(work);
-}
 
-/// Returns what is made of each item.
-pub(crate) fn map<T: Send, R: Send>(
-    items: impl IntoIterator<Item = T>,
-    make: impl Fn(T) -> R + Sync,
-) -> Vec<R> {
-    let places: Vec<_> = items.into_iter().map(|item| Mutex::new((Some(item), None))).collect();
-    each(places.len(), &|number| {
-        let item = lock(&places[number]).0.take().expect("each number comes once");
-        let made = make(item);
-        lock(&places[number]).1 = Some(made);
-    });
-    let made = places.into_iter().map(|place| place.into_inner().unwrap_or_else(PoisonError::into_inner).1);
-    made.map(|made| made.expect("each number has come")).collect()
-}
+    pub(crate) fn map<T, R>(items: impl IntoIterator<Item = T>, make: impl Fn(T) -> R) -> Vec<R> {
+        items.into_iter().map(make).collect()
+    }
 
-fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
-    place.lock().unwrap_or_else(PoisonError::into_inner)
-}
+    pub(crate) fn first(count: usize, holds: impl Fn(usize) -> bool) -> Option<usize> {
+        (0..count).find(|&number| holds(number))
+    }
 
-/// Returns the first number below `count` for which a condition holds.
-pub(crate) fn first(count: usize, holds: impl Fn(usize) -> bool + Sync) -> Option<usize> {
-    let least = AtomicUsize::new(usize::MAX);
-    each(count.div_ceil(RUN), &|run| {
-        let start = run * RUN;
-        if start < least.load(Ordering::Relaxed)
-            && let Some(found) = (start..count.min(start + RUN)).find(|&number| holds(number))
-        {
-            least.fetch_min(found, Ordering::Relaxed);
-        }
-    });
-    Some(least.into_inner()).filter(|&least| least < usize::MAX)
-}
-
-/// Changes each item, given its number.
-pub(crate) fn change<T: Send>(items: &mut [T], change: impl Fn(usize, &mut T) + Sync) {
-    map(items.chunks_mut(RUN).enumerate(), |(run, items)| {
-        items.iter_mut().zip(run * RUN..).for_each(|(item, number)| change(number, item));
-    });
-}
-
-/// Sorts items, of which equal ones may change places.
-pub(crate) fn sort_unstable<T: Ord + Send>(items: &mut [T]) {
-    #[cfg(feature = "parallel")]
-    rayon::slice::ParallelSliceMut::par_sort_unstable(items);
-    #[cfg(not(feature = "parallel"))]
-    items.sort_unstable();
+    pub(crate) fn sort_unstable<T: Ord>(items: &mut [T]) {
+        items.sort_unstable();
+    }
 }

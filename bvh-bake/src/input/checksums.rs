@@ -28,7 +28,7 @@ impl Checksums {
     /// Reads a glTF file into `sink`, which is a pass of the given weight.
     pub(crate) fn of_gltf(
         input: &InputFile,
-        sink: &mut impl Sink,
+        sink: &mut dyn Sink,
         memory: Allowance,
         progress: &Progress,
         weight: u64,

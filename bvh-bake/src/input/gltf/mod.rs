@@ -66,7 +66,7 @@ const BYTES_PER_JOINT: u64 = 128;
 pub(crate) fn read(
     input: &InputFile,
     access: &RandomAccess,
-    sink: &mut impl Sink,
+    sink: &mut dyn Sink,
     memory: Allowance,
     progress: &Progress,
 ) -> Result<u64, Halt> {
@@ -96,12 +96,12 @@ pub(crate) fn read(
 /// Whether S of a [`Frame`] is the same, to the bit.
 type ShapeBits = [[u64; 3]; 3];
 
-struct Scene<'a, S> {
+struct Scene<'a> {
     document: &'a Document,
     /// Whether nodes become instances.
     as_scene: bool,
     buffers: Buffers<'a>,
-    sink: &'a mut S,
+    sink: &'a mut dyn Sink,
     /// Hashes what the sink gets.
     hasher: Hasher,
     /// The number of objects so far.
@@ -136,7 +136,7 @@ impl Parent {
 /// A node that waits to be read: its number, its parent's transform, and whether a node above it is invisible.
 type Waiting = (usize, Parent, bool);
 
-impl<S: Sink> Scene<'_, S> {
+impl Scene<'_> {
     /// Visits the nodes of the scene, each before its children. Returns which nodes were read.
     fn read_nodes(&mut self) -> Result<Vec<bool>, Halt> {
         let nodes = &self.document.nodes;

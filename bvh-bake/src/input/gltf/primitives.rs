@@ -1,9 +1,9 @@
 //! Reads the primitives of a mesh: the vertices of each, which several may share, and triangles from lists, strips and fans.
 
+use super::Scene;
 use super::accessor::{self, BLOCK_BYTES, BLOCK_VALUES, Reader};
 use super::schema::{Mode, Primitive};
 use super::vertices::{Shape, Sources};
-use super::{Scene, Sink};
 use crate::error::{Fault, Halt, Place, excerpt};
 use crate::limits::MAX_VERTICES;
 use std::collections::HashMap;
@@ -19,7 +19,7 @@ struct Known {
     count: u64,
 }
 
-impl<'a, S: Sink> Scene<'a, S> {
+impl<'a> Scene<'a> {
     /// Reads a mesh as an object whose vertices are moved by `place`.
     pub(super) fn read_mesh(
         &mut self,
