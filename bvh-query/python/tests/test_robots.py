@@ -259,7 +259,7 @@ class Describing(unittest.TestCase):
         for warning, text in zip(robot.warnings, [*of_joint, "no link has a <collision>"], strict=True):
             self.assertIn(text, warning)
         visual = cbvh.Robot.from_urdf(urdf, geometry="visual")
-        self.assertIn("line.obj: line 5: left out a face", visual.warnings[2])
+        self.assertIn("line.obj: line 5: left out 1 face", visual.warnings[2])
         self.assertEqual((len(visual.warnings), visual.joints, visual.limits.tolist()), (3, ["j"], [[-np.inf, np.inf]]))
         self.assertEqual(pickle.loads(pickle.dumps(visual)).warnings, visual.warnings)
 
