@@ -95,6 +95,8 @@ impl<'a, S: Schema> Tree<'a, S> {
     /// # Errors
     /// [`XmlError`] if it is no XML, or has another root than the schema. What is passed over need not be valid.
     pub fn parse(text: &'a str) -> Result<Self, XmlError> {
+        // The parser does not count a byte order mark, so that its places would be others.
+        let text = text.trim_start_matches('\u{feff}');
         let mut tree = Self { text, elements: Vec::new(), attributes: Vec::new(), pieces: Vec::new() };
         let mut reader = Reader::from_str(text);
         reader.config_mut().expand_empty_elements = true;
@@ -346,6 +348,36 @@ impl<S: Schema> Iterator for Children<'_, '_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    struct Plain;
+
+    impl Schema for Plain {
+        type Tag = ();
+        type Attribute = ();
+        const ROOT: &'static str = "a";
+        fn root() {}
+        fn tag(_: (), name: &str) -> Option<()> {
+            (name == "b").then_some(())
+        }
+        fn attribute(name: &str) -> Option<()> {
+            (name == "n").then_some(())
+        }
+    }
+
+    #[test]
+    fn byte_order_marks_move_no_place() {
+        for mark in ["", "\u{feff}", "\u{feff}\u{feff}"] {
+            let text = format!("{mark}<a n='1'>\n<b n='2'/></a>");
+            let tree = Tree::<Plain>::parse(&text).unwrap();
+            assert_eq!((tree.attribute(0, ()), tree.attribute(1, ())), (Some("1"), Some("2")), "{mark:?}");
+            assert_eq!((tree.name(0), tree.name(1), tree.line(1)), ("a".into(), "b".into(), 2), "{mark:?}");
+            // The start of a root that is cut short, and of another one.
+            for (text, column) in [("<a n='1", 1), ("<c/>", 1), ("<a/><a/>", 5)] {
+                let error = Tree::<Plain>::parse(&format!("{mark}{text}")).err().unwrap();
+                assert_eq!((error.line, error.column), (1, column), "{mark:?}{text}: {error:?}");
+            }
+        }
+    }
 
     #[test]
     fn messages_end_with_a_word() {
