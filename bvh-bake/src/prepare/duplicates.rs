@@ -75,6 +75,7 @@ pub(crate) enum Found {
 }
 
 /// Returns the hash of the triangle at a place.
+#[inline]
 pub(crate) fn hashed(corners: &Corners, place: u64) -> Hashed {
     let hash = xxh3_64(bytemuck::bytes_of(&canonical(corners).0));
     Hashed([(hash >> 32) as u32, hash as u32, place as u32])

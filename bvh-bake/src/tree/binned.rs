@@ -2,10 +2,10 @@
 
 use super::binary::{Content, NONE, NodeIndex, Tree};
 use super::boxes::{Aabb, Binning, Cost, Reference};
-use super::lanes::Lanes;
 use super::swept;
 use super::{Builder, PacketTriangles};
 use crate::threads;
+use wide::f32x4;
 
 /// The number of bins along each axis of a node's box.
 const BINS_PER_AXIS: usize = 16;
@@ -170,7 +170,7 @@ fn fill_bins(references: &[Reference], binning: &Binning<BINS_PER_AXIS>) -> Bins
 fn partition(
     references: &mut [Reference],
     scratch: &mut [Reference],
-    is_left: impl Fn(Lanes) -> bool,
+    is_left: impl Fn(f32x4) -> bool,
 ) -> (usize, [Aabb; 2]) {
     let mut ends = [0; 2];
     let mut centres = [Aabb::EMPTY; 2];
@@ -183,8 +183,9 @@ fn partition(
         scratch[ends[1]] = reference;
         ends[side] += 1;
         // Both boxes stay in registers: the one that the centre is not in is joined with an empty box.
-        centres[0].join(&Aabb::of_point(centre).unless(side == 1));
-        centres[1].join(&Aabb::of_point(centre).unless(side == 0));
+        let is_right = f32x4::splat(f32::from_bits((side as u32).wrapping_neg()));
+        centres[0].join(&Aabb::of_point(centre).unless(is_right));
+        centres[1].join(&Aabb::of_point(centre).unless(!is_right));
     }
     references[ends[0]..].copy_from_slice(&scratch[..ends[1]]);
     (ends[0], centres)

@@ -1,8 +1,8 @@
 //! Boxes of triangles in two registers of four lanes, and the cost of splitting them.
 
-use super::lanes::Lanes;
 use crate::triangles::Corners;
 use bvh_format::leaf::PACKET;
+use wide::f32x4;
 
 /// The share of whole treelets in the weight of triangles; whole packets have the rest. At this share treelets are full
 /// enough, and queries make no more tests than at 0.
@@ -12,15 +12,16 @@ const TREELET_SHARE: f32 = 0.4;
 /// joined by taking the lesser of all lanes. The spare lanes mean nothing.
 #[derive(Clone, Copy)]
 pub(crate) struct Aabb {
-    lo: Lanes,
-    negated_hi: Lanes,
+    lo: f32x4,
+    negated_hi: f32x4,
 }
 
 impl Aabb {
-    pub(crate) const EMPTY: Self = Self { lo: Lanes::INFINITY, negated_hi: Lanes::INFINITY };
+    pub(crate) const EMPTY: Self =
+        Self { lo: f32x4::new([f32::INFINITY; 4]), negated_hi: f32x4::new([f32::INFINITY; 4]) };
 
     #[inline(always)]
-    pub(crate) fn of_point(point: Lanes) -> Self {
+    pub(crate) fn of_point(point: f32x4) -> Self {
         Self { lo: point, negated_hi: -point }
     }
 
@@ -32,16 +33,16 @@ impl Aabb {
 
     #[inline(always)]
     pub(crate) fn join(&mut self, other: &Self) {
-        self.lo = self.lo.lesser(other.lo);
-        self.negated_hi = self.negated_hi.lesser(other.negated_hi);
+        // This is `min` without its handling of NaN, which does not occur here. Of equal ends the box keeps its own.
+        self.lo = other.lo.fast_min(self.lo);
+        self.negated_hi = other.negated_hi.fast_min(self.negated_hi);
     }
 
-    /// Returns the box, or an empty one if the condition holds.
+    /// Returns the box, or an empty one if all bits of the condition are set.
     #[inline(always)]
-    pub(super) fn unless(&self, condition: bool) -> Self {
-        // Nothing is less than this, or all that is not NaN is less than infinity.
-        let least = Lanes::splat(if condition { f32::INFINITY } else { f32::NEG_INFINITY });
-        Self { lo: self.lo.greater(least), negated_hi: self.negated_hi.greater(least) }
+    pub(super) fn unless(&self, condition: f32x4) -> Self {
+        let chosen = |own: f32x4| condition.bitselect(f32x4::splat(f32::INFINITY), own);
+        Self { lo: chosen(self.lo), negated_hi: chosen(self.negated_hi) }
     }
 
     #[inline(always)]
@@ -63,13 +64,13 @@ impl Aabb {
     }
 
     #[inline(always)]
-    fn extents(&self) -> Lanes {
+    fn extents(&self) -> f32x4 {
         -(self.lo + self.negated_hi)
     }
 
     /// Returns twice the centre. The spare lane of a triangle's box is 0.
     #[inline(always)]
-    pub(crate) fn centre(&self) -> Lanes {
+    pub(crate) fn centre(&self) -> f32x4 {
         self.lo - self.negated_hi
     }
 
@@ -104,10 +105,10 @@ impl Reference {
 
     #[inline(always)]
     pub(super) fn new(triangle: u32, corners: &Corners) -> Self {
-        let lesser = |ends: [Lanes; 3]| ends[0].lesser(ends[1]).lesser(ends[2]);
+        let lesser = |ends: [f32x4; 3]| ends[2].fast_min(ends[1].fast_min(ends[0]));
         let number = f32::from_bits(triangle);
-        let lanes = corners.map(|[x, y, z]| Lanes::new([x, y, z, number]));
-        let negated = corners.map(|[x, y, z]| Lanes::new([-x, -y, -z, number]));
+        let lanes = corners.map(|[x, y, z]| f32x4::new([x, y, z, number]));
+        let negated = corners.map(|[x, y, z]| f32x4::new([-x, -y, -z, number]));
         Self(Aabb { lo: lesser(lanes), negated_hi: lesser(negated) })
     }
 
@@ -125,8 +126,8 @@ impl Reference {
 /// Sorts centres into bins along each axis. The first and the last bin are half as wide as the others.
 #[derive(Clone, Copy)]
 pub(super) struct Binning<const BINS: usize> {
-    from: Lanes,
-    scale: Lanes,
+    from: f32x4,
+    scale: f32x4,
 }
 
 impl<const BINS: usize> Binning<BINS> {
@@ -136,16 +137,16 @@ impl<const BINS: usize> Binning<BINS> {
             let extent = centres.extent(axis);
             if extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 }
         };
-        let axes = |value: &dyn Fn(usize) -> f32| Lanes::new([value(0), value(1), value(2), 0.0]);
+        let axes = |value: &dyn Fn(usize) -> f32| f32x4::new([value(0), value(1), value(2), 0.0]);
         Self { from: axes(&|axis| centres.lo(axis)), scale: axes(&scale) }
     }
 
     /// Returns the bins of a centre, each less than `BINS`, which is a power of two.
     #[inline(always)]
-    pub(super) fn bins(&self, centre: Lanes) -> [usize; 3] {
+    pub(super) fn bins(&self, centre: f32x4) -> [usize; 3] {
         // Adding 2^23 leaves the nearest whole number in the last bits. A scale that overflowed, as it does for tiny
         // extents, puts all centres into one bin.
-        let [x, y, z, _] = ((centre - self.from) * self.scale + Lanes::splat(8388608.0)).to_array();
+        let [x, y, z, _] = ((centre - self.from) * self.scale + f32x4::splat(8388608.0)).to_array();
         [x, y, z].map(|bin| bin.to_bits() as usize & (BINS - 1))
     }
 }

@@ -12,12 +12,12 @@
 use super::Builder;
 use super::binary::Tree;
 use super::boxes::{Aabb, Binning, Cost};
-use super::lanes::Lanes;
 use crate::error::BakeError;
 use crate::progress::Tally;
 use crate::storage::resources::Resources;
 use crate::storage::{Spill, Stream};
 use crate::triangles::{Grouped, InStream, Triangle, Triangles, distribute, fold};
+use wide::f32x4;
 
 /// The number of cells of the grid along each axis.
 const CELLS_PER_AXIS: usize = 64;
@@ -181,7 +181,7 @@ impl Grid {
         Ok(grids.into_iter().reduce(|a, b| a.merged(&b)).unwrap_or_else(|| Self::empty(&centres)))
     }
 
-    fn cell(&self, centre: Lanes) -> usize {
+    fn cell(&self, centre: f32x4) -> usize {
         let [x, y, z] = self.binning.bins(centre);
         (x * CELLS_PER_AXIS + y) * CELLS_PER_AXIS + z
     }

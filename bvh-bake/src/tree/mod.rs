@@ -12,7 +12,6 @@ mod binary;
 mod binned;
 mod boxes;
 mod bricks;
-mod lanes;
 mod reinsert;
 mod swept;
 pub(crate) mod treelets;
