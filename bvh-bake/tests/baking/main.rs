@@ -2,11 +2,13 @@
 
 mod bake;
 mod clouds;
+mod files;
 mod golden;
 mod hull;
 mod progress;
 mod stored;
 mod topology;
+mod verify;
 
 use bvh_bake::mesh::Mesh;
 use cbvh_testkit::Triangle;

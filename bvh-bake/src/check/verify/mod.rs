@@ -417,6 +417,3 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     }
     largest * difference.iter().map(|value| (value / largest).powi(2)).sum::<f64>().sqrt()
 }
-
-#[cfg(test)]
-mod tests;

@@ -7,9 +7,10 @@ use super::gltf_model::Model;
 use super::{CORNERS, TWO, binary_stl, one_line, ply};
 use bvh_bake::Options;
 use bvh_bake::input::{MeshFormat, read, read_bytes_with};
+use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
-use proptest::prelude::*;
 use std::fs;
+use std::panic::catch_unwind;
 use std::path::Path;
 
 /// For each file, the number of triangles if it can be read, or else a part of the error message.
@@ -212,29 +213,58 @@ fn seeds_are_read() {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: rounds(200) as u32, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        FORMATS.iter().for_each(|&format| survives(&bytes, format));
+/// Asserts it of random files, which each call of `file` makes.
+fn all_survive(seed: u64, mut file: impl FnMut(&mut Random) -> (MeshFormat, Vec<u8>)) {
+    let random = &mut Random::new(seed);
+    for round in 0..rounds(200) {
+        let (format, bytes) = file(random);
+        let survived = catch_unwind(|| survives(&bytes, format));
+        assert!(survived.is_ok(), "round {round}, {format:?}: {}", bytes.escape_ascii());
     }
+}
 
-    #[test]
-    fn statements_at_random_never_panic(text in "([vfog] |[-0-9./ ]{1,9}|nan|1e999|[\\\\\n\r#]){0,60}") {
-        survives(text.as_bytes(), MeshFormat::Obj);
+/// Returns one of them.
+fn any<T>(mut of: Vec<T>, random: &mut Random) -> T {
+    of.swap_remove(random.below(of.len()))
+}
+
+#[test]
+fn random_bytes_never_panic() {
+    for (seed, format) in FORMATS.into_iter().enumerate() {
+        all_survive(seed as u64, |random| {
+            let length = random.below(300);
+            (format, (0..length).map(|_| random.bits() as u8).collect())
+        });
     }
+}
 
-    #[test]
-    fn elements_at_random_never_panic(
-        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 1..6),
-    ) {
+#[test]
+fn statements_at_random_never_panic() {
+    let few = b"-0123456789./ ";
+    all_survive(10, |random| {
+        let mut text = Vec::new();
+        for _ in 0..random.below(61) {
+            match random.below(5) {
+                0 => text.extend([b"vfog"[random.below(4)], b' ']),
+                1 => (0..=random.below(9)).for_each(|_| text.push(few[random.below(few.len())])),
+                2 => text.extend(b"nan"),
+                3 => text.extend(b"1e999"),
+                _ => text.push(b"\\\n\r#"[random.below(4)]),
+            }
+        }
+        (MeshFormat::Obj, text)
+    });
+}
+
+#[test]
+fn elements_at_random_never_panic() {
+    let places = |text: &str| text.match_indices('<').map(|(at, _)| at).collect::<Vec<_>>();
+    all_survive(11, |random| {
         let mut text = collada();
-        for (from, to) in edits {
-            let places = |text: &str| text.match_indices('<').map(|(at, _)| at).collect::<Vec<_>>();
+        for _ in 0..=random.below(5) {
             // An element and what follows it up to the next one goes elsewhere.
             let all = places(&text);
-            let start = all[from.index(all.len())];
+            let start = all[random.below(all.len())];
             let end = all.iter().copied().find(|&at| at > start).unwrap_or(text.len());
             let piece = text[start..end].to_owned();
             text.replace_range(start..end, "");
@@ -242,45 +272,43 @@ proptest! {
             if rest.is_empty() {
                 break;
             }
-            text.insert_str(rest[to.index(rest.len())], &piece);
+            text.insert_str(rest[random.below(rest.len())], &piece);
         }
-        survives(text.as_bytes(), MeshFormat::Collada);
-    }
+        (MeshFormat::Collada, text.into_bytes())
+    });
+}
 
-    #[test]
-    fn mutated_files_never_panic(
-        seed in any::<prop::sample::Index>(),
-        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0u8..4), 1..6),
-    ) {
-        let mut seeds = seeds();
-        let (format, mut bytes) = seeds.swap_remove(seed.index(seeds.len()));
-        for (at, value, kind) in edits {
+#[test]
+fn mutated_files_never_panic() {
+    all_survive(12, |random| {
+        let (format, mut bytes) = any(seeds(), random);
+        for _ in 0..=random.below(5) {
             if bytes.is_empty() {
                 break;
             }
-            let place = at.index(bytes.len());
-            match kind {
+            let (place, value) = (random.below(bytes.len()), random.bits() as u8);
+            match random.below(4) {
                 0 => bytes[place] = value,
                 1 => bytes[place] ^= 1 << (value % 8),
                 2 => drop(bytes.remove(place)),
                 _ => bytes.truncate(place),
             }
         }
-        survives(&bytes, format);
-    }
+        (format, bytes)
+    });
+}
 
-    #[test]
-    fn digits_changed_in_a_document_never_panic(
-        seed in any::<prop::sample::Index>(),
-        edits in prop::collection::vec((any::<prop::sample::Index>(), b'0'..=b'9'), 1..5),
-    ) {
+#[test]
+fn digits_changed_in_a_document_never_panic() {
+    all_survive(13, |random| {
         let mut documents = seeds();
-        documents.retain(|(format, _)| matches!(format, MeshFormat::Gltf | MeshFormat::Collada | MeshFormat::Pcd));
-        let (format, mut bytes) = documents.swap_remove(seed.index(documents.len()));
+        documents
+            .retain(|(format, _)| matches!(format, MeshFormat::Gltf | MeshFormat::Collada | MeshFormat::Pcd));
+        let (format, mut bytes) = any(documents, random);
         let digits: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at].is_ascii_digit()).collect();
-        for (at, digit) in edits {
-            bytes[digits[at.index(digits.len())]] = digit;
+        for _ in 0..=random.below(4) {
+            bytes[digits[random.below(digits.len())]] = b'0' + random.below(10) as u8;
         }
-        survives(&bytes, format);
-    }
+        (format, bytes)
+    });
 }

@@ -1,9 +1,10 @@
 //! Checks that faithful bakes pass and that every way of being unfaithful is reported.
 
-use super::*;
-use crate::input::mesh::Object as MeshObject;
-use crate::{Options, to_bytes};
+use bvh_bake::mesh::{Mesh, Object};
+use bvh_bake::{FileError, Options, VerifyError, VerifyOptions, to_bytes, verify, verify_files};
 use bvh_format::leaf::TriangleEncoding;
+use cbvh_testkit::stored::stored;
+use std::path::Path;
 
 /// A wavy sheet of `2 * n * n` triangles in two objects, moved by `offset`.
 fn sheet(n: u32, offset: f64) -> Mesh {
@@ -30,7 +31,7 @@ fn sheet(n: u32, offset: f64) -> Mesh {
     let vertices = positions.len() as u32;
     let others: Vec<_> = triangles.iter().step_by(2).map(|t| t.map(|v| v + vertices)).collect();
     let count = (turned.len() + others.len()) as u32;
-    mesh.objects.push(MeshObject {
+    mesh.objects.push(Object {
         name: "second".into(),
         positions: [positions, moved].concat(),
         triangles: [turned, others].concat(),
@@ -141,7 +142,6 @@ fn write_obj(mesh: &Mesh, path: &Path) {
 fn files_are_told_as_meshes_in_memory() {
     let folder = cbvh_testkit::folder();
     let [file, obj] = ["f.cbvh", "m.obj"].map(|name| folder.path().join(name));
-    let scratch = Some(folder.path().to_owned());
     let (mut fine, mut wrong) = (0, std::collections::BTreeSet::new());
     for (mesh, options) in bakes() {
         let (bytes, baked) = to_bytes(&mesh, &options).unwrap();
@@ -169,8 +169,8 @@ fn files_are_told_as_meshes_in_memory() {
             std::fs::write(&file, &bytes).unwrap();
             write_obj(&mesh, &obj);
             let in_memory = verify(&bytes, &mesh).map_err(|error| error.to_string());
-            for max_memory in [None, Some(100 << 20)] {
-                let options = VerifyOptions { max_memory, scratch: scratch.clone(), ..Default::default() };
+            let here = VerifyOptions::default().scratch(folder.path().to_owned());
+            for options in [here.clone(), here.max_memory(100 << 20)] {
                 let streamed = verify_files(&file, std::slice::from_ref(&obj), &options);
                 assert_eq!(streamed.map_err(|error| error.to_string()), in_memory);
             }
@@ -189,14 +189,6 @@ fn files_are_told_as_meshes_in_memory() {
 fn the_first_difference_is_told() {
     let mesh = sheet(12, 0.0);
     let (bytes, _) = to_bytes(&mesh, &Options::default()).unwrap();
-    let layout = Layout::read(&bytes).unwrap();
-    let mut ids = Vec::new();
-    let object = &layout.objects[0];
-    let mut note = |triangle: &Stored| {
-        ids.extend(triangle.id);
-        Ok(())
-    };
-    File { layout: &layout, source: &bytes[..] }.each_triangle(object, &mut note).unwrap();
     let mut other = mesh.clone();
     let all: Vec<(usize, u32)> = (0..mesh.objects.len())
         .flat_map(|object| mesh.objects[object].triangle_ids.iter().map(move |&id| (object, id)))
@@ -206,7 +198,7 @@ fn the_first_difference_is_told() {
         other.objects[object].triangles[(id - first) as usize].reverse();
     }
     let error = verify(&bytes, &other).unwrap_err().to_string();
-    assert!(error.starts_with(&format!("triangle {}, corner 0", ids[0])), "{error}, {:?}", &ids[..3]);
+    assert!(error.starts_with(&format!("triangle {}, corner 0", stored(&bytes)[0].id)), "{error}");
 }
 
 #[test]
@@ -215,7 +207,11 @@ fn a_small_budget_is_refused() {
     let file = folder.path().join("f.cbvh");
     let (bytes, _) = to_bytes(&sheet(5, 0.0), &Options::default()).unwrap();
     std::fs::write(&file, bytes).unwrap();
-    let options = VerifyOptions::default().max_memory(Resources::least_of_check() - 1);
-    let refused = verify_files(&file, &[folder.path().join("m.obj")], &options).unwrap_err();
-    assert!(matches!(refused, VerifyError::File(FileError::Memory { .. })), "{refused}");
+    let check = |budget| {
+        let options = VerifyOptions::default().max_memory(budget);
+        verify_files(&file, &[folder.path().join("m.obj")], &options).unwrap_err()
+    };
+    let VerifyError::File(FileError::Memory { needed, .. }) = check(1) else { panic!("{}", check(1)) };
+    assert!(matches!(check(needed - 1), VerifyError::File(FileError::Memory { .. })));
+    assert!(!matches!(check(needed), VerifyError::File(FileError::Memory { .. })), "there is no m.obj");
 }
