@@ -74,7 +74,7 @@ fn the_nearest_goal_is_the_same_configuration_half_a_turn_away() {
     }
 }
 
-/// However many turns away a goal is, the nearest one is as exact.
+/// However many turns away a goal is, the nearest one is as exact. Not every system's own functions bear so many turns.
 #[test]
 fn many_turns_cost_no_digits() {
     let robot = turning();
@@ -82,7 +82,8 @@ fn many_turns_cost_no_digits() {
     for turns in [1.0, -7.0, 1e4, -1e6, 1.5e8] {
         goal[0] = 1.0 + turns * TAU;
         let near = robot.nearest_turns(&start, &goal).unwrap()[0];
-        assert!((near.sin() - goal[0].sin()).abs() < 1e-15 && (near.cos() - goal[0].cos()).abs() < 1e-15);
+        let [near_at, goal_at] = [near, goal[0]].map(|angle| libm::sincos(angle));
+        assert!((near_at.0 - goal_at.0).abs() < 1e-15 && (near_at.1 - goal_at.1).abs() < 1e-15);
         assert!(near.abs() <= PI, "{turns}: {near}");
     }
 }

@@ -49,7 +49,9 @@ fn uris_are_read_as_they_are_and_then_decoded() {
     write_mesh(&folder.join("ws/my hand/m.obj"), 7);
     write_mesh(&folder.join("elsewhere/m.obj"), 8);
     let urdf = &folder.join("ws/arm/urdf/r.urdf");
-    let whole = format!("{}", folder.join("ws/arm/meshes").display());
+    let whole = folder.join("ws/arm/meshes").display().to_string().replace('\\', "/");
+    // Before the letter of a drive there is a slash.
+    let whole = format!("/{}", whole.trim_start_matches('/'));
     let named = |name: &str| {
         [
             format!("file://{whole}/{name}"),
