@@ -82,7 +82,7 @@ fn many_turns_cost_no_digits() {
     for turns in [1.0, -7.0, 1e4, -1e6, 1.5e8] {
         goal[0] = 1.0 + turns * TAU;
         let near = robot.nearest_turns(&start, &goal).unwrap()[0];
-        let [near_at, goal_at] = [near, goal[0]].map(|angle| libm::sincos(angle));
+        let [near_at, goal_at] = [near, goal[0]].map(libm::sincos);
         assert!((near_at.0 - goal_at.0).abs() < 1e-15 && (near_at.1 - goal_at.1).abs() < 1e-15);
         assert!(near.abs() <= PI, "{turns}: {near}");
     }
