@@ -66,9 +66,8 @@ pub(crate) fn find(uri: &str, urdf: &Path, folders: &[PathBuf]) -> Result<Named,
             })
         }),
         "file" => {
-            // The path begins with the slash behind the host.
+            // The path begins with the slash behind the host or, on Windows, with the drive behind that slash.
             let path = rest.strip_prefix("localhost").filter(|path| path.starts_with('/')).unwrap_or(rest);
-            // But not where a drive follows it.
             let is_drive = |path: &&str| cfg!(windows) && path.as_bytes().get(1) == Some(&b':');
             let drive = path.strip_prefix('/').filter(is_drive);
             let path = drive.unwrap_or(path);

@@ -213,7 +213,7 @@ fn seeds_are_read() {
     }
 }
 
-/// Asserts it of random files, which each call of `file` makes.
+/// Asserts that reading survives random files, each of which a call of `file` makes.
 fn all_survive(seed: u64, mut file: impl FnMut(&mut Random) -> (MeshFormat, Vec<u8>)) {
     let random = &mut Random::new(seed);
     for round in 0..rounds(200) {
@@ -223,7 +223,7 @@ fn all_survive(seed: u64, mut file: impl FnMut(&mut Random) -> (MeshFormat, Vec<
     }
 }
 
-/// Returns one of them.
+/// Returns a random element.
 fn any<T>(mut of: Vec<T>, random: &mut Random) -> T {
     of.swap_remove(random.below(of.len()))
 }
