@@ -77,7 +77,7 @@ pub use check::prove::{prove_bounds, validate_in_parallel};
 pub use check::verify::{VerifyError, VerifyOptions, VerifyReport, verify, verify_files};
 pub use error::{BakeError, InputError, LimitError, Place, ReadError, ShapeError};
 pub use input::{MeshFormat, mesh, read_meshes};
-pub use options::{Effort, Options};
+pub use options::{Effort, Options, Rounding};
 pub use progress::{Progress, Stage, Step, Traffic};
 pub use storage::atomic::{discard_unfinished, write_atomically, write_atomically_with};
 pub use storage::stored_file::{FileError, StoredFile};

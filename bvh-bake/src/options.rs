@@ -33,6 +33,36 @@ impl Effort {
     }
 }
 
+/// How a bake rounds the coordinates of its input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Rounding {
+    /// Not at all, beyond what the file needs.
+    #[default]
+    None,
+    /// To the nearest `f32` number, ties to even, as games store them. Numbers that are equal in two inputs stay equal, whatever
+    /// else the inputs contain.
+    F32,
+}
+
+impl Rounding {
+    /// All ways to round.
+    pub const ALL: [Self; 2] = [Self::None, Self::F32];
+
+    /// Returns the name used in options and in the provenance.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::F32 => "f32",
+        }
+    }
+
+    /// Returns the way to round with a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|rounding| rounding.name() == name)
+    }
+}
+
 /// The options of a bake. `Options::default()` is right for most meshes; each method changes one option of it.
 ///
 /// ```
@@ -51,6 +81,9 @@ pub struct Options {
     /// With `Quantized`, the largest distance by which a vertex may move, in mesh units. The default is 1e-5 of the
     /// diagonal of the object's box, and the limit is a hundredth of the diagonal.
     pub max_error: Option<f64>,
+    /// How coordinates are rounded, those of a scene in the frames of its objects. Poses are not rounded, and nor are
+    /// [`Self::radius`] and margins. Each file states by how much its vertices moved in `max_vertex_rounding`.
+    pub round: Rounding,
     /// The time spent on the tree.
     pub effort: Effort,
     /// Whether each object of the input gets a tree of its own. [`crate::FileBake`] names objects without a name after
@@ -82,6 +115,7 @@ impl Default for Options {
             profile: None,
             triangles: None,
             max_error: None,
+            round: Rounding::None,
             effort: Effort::Default,
             split_objects: false,
             scene: false,
@@ -112,6 +146,12 @@ impl Options {
     #[must_use]
     pub fn max_error(self, max_error: impl Into<Option<f64>>) -> Self {
         Self { max_error: max_error.into(), ..self }
+    }
+
+    /// Sets how coordinates are rounded.
+    #[must_use]
+    pub fn round(self, round: Rounding) -> Self {
+        Self { round, ..self }
     }
 
     /// Sets the time spent on the tree.
@@ -171,7 +211,7 @@ impl Options {
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
@@ -183,7 +223,12 @@ impl Options {
             if self.drop_nan { " drop_nan=true" } else { "" },
             if self.topology { "" } else { " topology=false" },
             if self.radius == 0.0 { String::new() } else { format!(" radius={:?}", self.radius) },
-            if self.solid { " solid=true" } else { "" }
+            if self.solid { " solid=true" } else { "" },
+            if self.round == Rounding::None {
+                String::new()
+            } else {
+                format!(" round={}", self.round.name())
+            }
         )
     }
 }

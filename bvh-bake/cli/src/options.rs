@@ -1,12 +1,12 @@
-//! Options of several commands: the layout of nodes and triangles (`--profile` and `--triangles`), numbers, and shards.
+//! Options of several commands: the layout of nodes and triangles (`--profile` and `--triangles`), rounding, numbers, and shards.
 
-use bvh_bake::Options;
+use bvh_bake::{Options, Rounding};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use clap::Args;
 use std::fmt;
 
-/// How nodes and triangles are stored.
+/// How coordinates are rounded, and how nodes and triangles are stored.
 #[derive(Debug, Args)]
 pub(crate) struct LayoutArguments {
     /// Bounding volumes: auto, dop14-u8, dop6-u8, dop6-f16, dop14-f32, dop26-u4 or dop26-u8-wide
@@ -15,12 +15,15 @@ pub(crate) struct LayoutArguments {
     /// Triangles: auto, f32 (the fastest), packed (the same values in fewer bytes) or quantized (vertices move a little)
     #[arg(long, value_name = "T", default_value = "auto", value_parser = triangles)]
     pub(crate) triangles: Choice<TriangleEncoding>,
+    /// Coordinates: none, or f32, which rounds each to the nearest f32 number on purpose, so that equal ones stay equal
+    #[arg(long, value_name = "R", default_value = "none", value_parser = rounding)]
+    pub(crate) round: Rounding,
 }
 
 impl LayoutArguments {
-    /// Returns the default options with this layout.
+    /// Returns the default options with this rounding and this layout.
     pub(crate) fn to_options(&self) -> Options {
-        Options::default().profile(self.profile).triangles(self.triangles)
+        Options::default().profile(self.profile).triangles(self.triangles).round(self.round)
     }
 
     /// Returns whether vertices may move, so that `--max-error` has a meaning.
@@ -41,6 +44,11 @@ pub(crate) fn profile(name: &str) -> Result<Choice<Profile>, String> {
 /// Parses the name of a triangle encoding.
 pub(crate) fn triangles(name: &str) -> Result<Choice<TriangleEncoding>, String> {
     choice(name, &TriangleEncoding::ALL, TriangleEncoding::name)
+}
+
+/// Parses the name of a way to round.
+pub(crate) fn rounding(name: &str) -> Result<Rounding, String> {
+    Rounding::from_name(name).ok_or_else(|| "expected none or f32".to_owned())
 }
 
 /// Finds the choice of this name.

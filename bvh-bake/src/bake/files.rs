@@ -174,7 +174,8 @@ impl<'a> FileBake<'a> {
             None => Resources::unlimited(&self.progress),
         };
         let mut start = Instant::now();
-        let mut gatherer = Gatherer::new(&resources, self.options.split_objects || self.options.scene);
+        let split = self.options.split_objects || self.options.scene;
+        let mut gatherer = Gatherer::new(&resources, split).rounding(self.options.round);
         let checksums = inputs.iter().map(|input| gatherer.read(input)).collect::<Result<Vec<_>, _>>()?;
         drop(inputs);
         if self.max_memory.is_some() {

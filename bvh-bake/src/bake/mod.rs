@@ -60,7 +60,7 @@ pub fn to_bytes_with(
     mesh.check()?;
     let resources = Resources::unlimited(&Progress::default());
     let split = options.split_objects || !mesh.instances.is_empty();
-    let mut gatherer = Gatherer::new(&resources, split);
+    let mut gatherer = Gatherer::new(&resources, split).rounding(options.round);
     // A mesh in memory has no file name.
     gatherer.add_mesh(mesh).map_err(|halt| halt.in_file(Path::new("")))?;
     let mut output = Output::Memory(Vec::new());

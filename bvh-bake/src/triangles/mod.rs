@@ -2,6 +2,7 @@
 
 mod passes;
 pub(crate) mod placement;
+mod rounding;
 mod stream;
 
 pub(crate) use passes::{Grouped, InStream, distribute, fold};

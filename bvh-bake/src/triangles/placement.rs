@@ -70,6 +70,12 @@ pub(crate) struct Moved {
 }
 
 impl Moved {
+    /// Records how far rounding moved a vertex.
+    #[inline]
+    pub(crate) fn record_rounding(&mut self, by: [f64; 3]) {
+        self.rounding = max_norm(self.rounding, by);
+    }
+
     pub(crate) fn joined(self, other: Self) -> Self {
         Self {
             rounding: self.rounding.max(other.rounding),

@@ -6,6 +6,7 @@ mod files;
 mod golden;
 mod hull;
 mod progress;
+mod rounding;
 mod stored;
 mod topology;
 mod verify;

@@ -127,6 +127,7 @@ struct Line {
     profile: Option<String>,
     triangles: Option<String>,
     max_error: Option<f64>,
+    round: Option<String>,
     effort: Option<String>,
     split_objects: Option<bool>,
     scene: Option<bool>,
@@ -177,6 +178,9 @@ impl Line {
         }
         if let Some(name) = &self.triangles {
             options.triangles = choice("triangles", name, options::triangles)?;
+        }
+        if let Some(name) = &self.round {
+            options.round = choice("round", name, options::rounding)?;
         }
         if let Some(name) = &self.effort {
             options.effort = choice("effort", name, bake::effort)?;

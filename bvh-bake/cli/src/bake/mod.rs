@@ -137,6 +137,10 @@ mesh becomes an instance. Nodes share their meshes: the file has one object for 
 files becomes an instance where it stands. An instance has the name of its node; .2, .3 and so on are added to a name that \
 occurs again. cbvh scene asks about such a file.
 
+--round f32 rounds each coordinate to the nearest f32 number, ties to even, as games store them. Numbers that are equal in two \
+files then stay equal, so that parts which share a face touch, and the origin of each object is 0. The output states how far \
+vertices moved. In a scene, the coordinates of objects are rounded, and poses are not.
+
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
 
@@ -174,7 +178,7 @@ Many assets:
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
-profile, triangles, max_error, effort, split_objects, scene, drop_nan, ids, topology, radius and solid; the options on the command line are their \
+profile, triangles, max_error, round, effort, split_objects, scene, drop_nan, ids, topology, radius and solid; the options on the command line are their \
 defaults. Paths are relative to the manifest and may lead anywhere. Inputs must be regular files, so that the command never \
 waits for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \

@@ -9,10 +9,11 @@ mod zip;
 
 use crate::asking::{self, files::write_file};
 use crate::console::{self, Failure, Record, counted, csv, record, shown, spinner};
-use crate::options::{Shard, not_negative, threads, whole};
+use crate::options::{Shard, not_negative, rounding, threads, whole};
 use crate::process;
 use crate::view::output::{self, PageArguments, refuse_input, refuse_standard_output};
 use baseline::{Baseline, Old};
+use bvh_bake::Rounding;
 use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, QueryError, SceneError};
 use clap::Args;
 use found::{BY_WEIGHT, Found, Status, both, short};
@@ -100,6 +101,9 @@ pub(crate) struct ClashArguments {
     /// Compare with what --json printed earlier
     #[arg(long, value_name = "OLD.json", conflicts_with = "shard")]
     baseline: Option<PathBuf>,
+    /// Coordinates of meshes: none, or f32, which rounds each to the nearest f32 number on purpose, so that equal ones stay equal
+    #[arg(long, value_name = "R", default_value = "none", value_parser = rounding)]
+    round: Rounding,
     /// Exit with code 5 if there is a clash of these classes, separated by commas; with --baseline, a new or changed one
     #[arg(long, value_name = "CLASS", value_delimiter = ',', value_parser = class)]
     fail_on: Vec<ClashClass>,

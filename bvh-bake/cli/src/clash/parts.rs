@@ -80,7 +80,9 @@ impl Assembly {
             *left += 1;
         }
         let files = process::files();
-        let read: Vec<_> = distinct.par_iter().map(|path| read_file(path, &files, splits)).collect();
+        let options = Options::default().round(arguments.round);
+        let read: Vec<_> =
+            distinct.par_iter().map(|path| read_file(path, &files, splits, &options)).collect();
         let mut read = read.into_iter().collect::<Result<Vec<_>, _>>()?;
         let mut parts = Vec::new();
         for Input { path, prefix, pose } in &inputs {
@@ -225,7 +227,7 @@ fn without_extension(path: &Path) -> String {
 }
 
 /// Returns the parts of one file: its instances, the objects of a `.cbvh` file, or all of a mesh, unless it is split.
-fn read_file(path: &Path, files: &Files, splits: bool) -> Result<Vec<Part>, Failure> {
+fn read_file(path: &Path, files: &Files, splits: bool, options: &Options) -> Result<Vec<Part>, Failure> {
     if is_baked(path)? {
         let bvh = process::map(path, ReadAhead::Usual)?;
         if !bvh.layout().has_topology() {
@@ -251,7 +253,7 @@ fn read_file(path: &Path, files: &Files, splits: bool) -> Result<Vec<Part>, Fail
         // Equal meshes of several files are then equal files.
         mesh.objects.iter_mut().for_each(|object| object.name.clear());
     }
-    let (bvh, _) = bake_in_memory(path, &mesh, &Options::default())?;
+    let (bvh, _) = bake_in_memory(path, &mesh, options)?;
     parts_of(path, &bvh, |number| open_object(&bvh, number))
 }
 

@@ -11,6 +11,7 @@ mod probe;
 mod query;
 mod report;
 mod report_motions;
+mod rounding;
 mod scene;
 mod suite;
 mod view;

@@ -78,6 +78,19 @@ fn a_page_has_the_files_byte_for_byte() {
 }
 
 #[test]
+fn meshes_are_rounded_on_request() {
+    let folder = place();
+    folder.write("far.obj", "v 1000.2 0 0\nv 1000.3 0 0\nv 1000.2 1 0\nf 1 2 3\n");
+    view(&folder, &["far.obj", "--round", "f32"]).done();
+    folder.write("shown.cbvh", &page(&folder).1[0]);
+    folder.cbvh("bake far.obj -o baked.cbvh --round f32 -q").done();
+    let content =
+        |name: &str| folder.cbvh(&format!("dump {name} --json")).done().json()["content_xxh3"].clone();
+    assert!(content("shown.cbvh").is_string());
+    assert_eq!(content("shown.cbvh"), content("baked.cbvh"));
+}
+
+#[test]
 fn one_file_is_shown_alone_or_is_both() {
     let folder = world();
     view(&folder, &["cube.cbvh"]).done();

@@ -108,7 +108,7 @@ fn run_counts(directory: &Path, done: u64, skipped: u64) -> Vec<Value> {
 #[test]
 fn bytes_are_those_of_single_bakes() {
     let directory = &place();
-    let options: [(Value, &[&str]); 8] = [
+    let options: [(Value, &[&str]); 9] = [
         (json!({"topology": false}), &["--no-ids", "--no-topology"]),
         (json!({}), &["--no-ids"]),
         (json!({"ids": true}), &[]),
@@ -126,6 +126,7 @@ fn bytes_are_those_of_single_bakes() {
             &["--no-ids", "--split-objects", "--effort", "fast"],
         ),
         (json!({"split_objects": false, "effort": "fast"}), &["--no-ids", "--effort", "fast"]),
+        (json!({"round": "f32"}), &["--no-ids", "--round", "f32"]),
     ];
     let line = |number: usize| {
         let mut line = usual(number);
@@ -136,7 +137,7 @@ fn bytes_are_those_of_single_bakes() {
     write_assets(directory, options.len(), line);
     for more in [&["--no-ids"][..], &["--no-ids", "--force", "--max-memory", "64MiB", "--jobs", "3"]] {
         let summary = bake(directory, "out.jsonl", more).done().json();
-        counts(&summary, 8, 8, 0, 0);
+        counts(&summary, 9, 9, 0, 0);
         for (number, (_, arguments)) in options.iter().enumerate() {
             let input = format!("meshes/{number}.obj");
             let single = [&["bake", &input, "-o", "single.cbvh", "--json", "-q"], *arguments].concat();
@@ -329,6 +330,7 @@ fn a_wrong_line_is_told_by_its_number() {
         (r#"{"input": "a", "output": "b", "profile": "dop7"}"#, "profile: expected auto, dop14-u8"),
         (r#"{"input": "a", "output": "b", "triangles": "f64"}"#, "triangles: expected auto, f32"),
         (r#"{"input": "a", "output": "b", "effort": "low"}"#, "effort: expected fast"),
+        (r#"{"input": "a", "output": "b", "round": "f16"}"#, "round: expected none or f32"),
         (r#"{"input": "a", "output": "b", "max_error": 0.1}"#, "quantized"),
         (r#"{"input": "a", "output": "b", "triangles": "quantized", "max_error": -1}"#, "above 0"),
         (r#"{"input": "a", "output": "b"} {}"#, "trailing"),

@@ -22,11 +22,12 @@ use crate::error::InputError;
 use crate::error::{Fault, Halt, Place, ReadError};
 use crate::input::mesh::{Instance, renumber, tell_apart};
 use crate::limits::MAX_TRIANGLES;
+use crate::options::Rounding;
 use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
 use crate::storage::{Piece, Spill};
 use crate::threads;
-use crate::triangles::placement::{Extent, Placement};
+use crate::triangles::placement::{Extent, Moved, Placement};
 use crate::triangles::{Gathered, Part, TRIANGLES_PER_PART, Triangle, TriangleStream, WideTriangle};
 use input_order::ObjectRuns;
 use solids::SolidsForBake;
@@ -53,6 +54,7 @@ pub(crate) struct Gatherer<'a> {
     resources: &'a Resources,
     /// Whether objects stay separate.
     split: bool,
+    rounding: Rounding,
     spill: Spill,
     /// The instances of all inputs, by the numbers of their objects.
     instances: Vec<Instance>,
@@ -78,7 +80,10 @@ struct Body {
     open: Vec<WideTriangle>,
     /// The same triangles, stored while the body is not the current one.
     parked: Option<Piece<WideTriangle>>,
+    /// The range of the rounded coordinates.
     extent: Extent,
+    /// The largest distance by which rounding on request moved a vertex.
+    moved: Moved,
     count: u64,
     /// The number of distinct vertices.
     vertices: u64,
@@ -89,7 +94,8 @@ struct Body {
 impl Body {
     fn new() -> Self {
         let (parts, open) = (Vec::new(), Vec::new());
-        Self { parts, open, parked: None, extent: Extent::EMPTY, count: 0, vertices: 0, is_cloud: true }
+        let (extent, moved) = (Extent::EMPTY, Moved::default());
+        Self { parts, open, parked: None, extent, moved, count: 0, vertices: 0, is_cloud: true }
     }
 }
 
@@ -98,6 +104,7 @@ impl<'a> Gatherer<'a> {
         Self {
             resources,
             split,
+            rounding: Rounding::None,
             spill: resources.scratch.spill(),
             instances: Vec::new(),
             names: Vec::new(),
@@ -113,6 +120,11 @@ impl<'a> Gatherer<'a> {
     /// Makes a gatherer that joins all objects into one and records which triangles belong to which object.
     pub(crate) fn in_input_order(resources: &'a Resources) -> Self {
         Self { runs: Some(ObjectRuns::new()), ..Self::new(resources, false) }
+    }
+
+    /// Sets how coordinates are rounded.
+    pub(crate) fn rounding(self, rounding: Rounding) -> Self {
+        Self { rounding, ..self }
     }
 
     pub(crate) fn resources(&self) -> &'a Resources {
@@ -262,7 +274,7 @@ impl<'a> Gatherer<'a> {
         Ok(())
     }
 
-    /// Adds triangles to an object. -0.0 becomes 0.0. Ids must ascend within a body.
+    /// Adds triangles to an object, and rounds their coordinates. -0.0 becomes 0.0. Ids must ascend within a body.
     fn add_numbered(
         &mut self,
         object: usize,
@@ -284,16 +296,16 @@ impl<'a> Gatherer<'a> {
         if let Some(runs) = &mut self.runs {
             runs.add(object, count as u64, &self.spill)?;
         }
-        let (body, spill) = (&mut self.bodies[number], &self.spill);
+        let (body, spill, rounding) = (&mut self.bodies[number], &self.spill, self.rounding);
         body.count += count as u64;
-        let triangle = |place: usize| WideTriangle {
-            corners: corners_of(place).map(|corner| corner.map(|value| value + 0.0)),
+        let triangle = |place: usize, moved: &mut Moved| WideTriangle {
+            corners: corners_of(place).map(|corner| rounding.round(corner, moved)),
             id: id_of(place),
             spare: 0,
         };
         let fill_open = |body: &mut Body, places: Range<usize>| {
             for place in places {
-                let triangle = triangle(place);
+                let triangle = triangle(place, &mut body.moved);
                 body.is_cloud &= body.extent.add_triangle(&triangle.corners);
                 body.open.push(triangle);
             }
@@ -313,9 +325,9 @@ impl<'a> Gatherer<'a> {
         for batch in full.chunks(self.resources.reading_tasks(BYTES_PER_OPEN_PART)) {
             let filled = threads::map(batch, |&start| {
                 let places = start..start + TRIANGLES_PER_PART;
-                let (mut extent, mut is_cloud) = (Extent::EMPTY, true);
+                let (mut extent, mut moved, mut is_cloud) = (Extent::EMPTY, Moved::default(), true);
                 let mut measured = |place: usize| {
-                    let triangle = triangle(place);
+                    let triangle = triangle(place, &mut moved);
                     is_cloud &= extent.add_triangle(&triangle.corners);
                     triangle
                 };
@@ -323,13 +335,14 @@ impl<'a> Gatherer<'a> {
                     Some(triangles) => Part::Narrow(spill.put(triangles)?),
                     None => Part::Wide(spill.put(places.map(measured).collect())?),
                 };
-                Ok::<_, BakeError>((part, extent, is_cloud))
+                Ok::<_, BakeError>((part, extent, moved, is_cloud))
             });
             for filled in filled {
-                let (part, extent, is_cloud) = filled?;
+                let (part, extent, moved, is_cloud) = filled?;
                 body.parts.push(part);
                 body.is_cloud &= is_cloud;
                 body.extent = body.extent.joined(extent);
+                body.moved = body.moved.joined(moved);
             }
         }
         done += full.len() * TRIANGLES_PER_PART;
@@ -397,7 +410,7 @@ impl<'a> Gatherer<'a> {
                 name,
                 origin: placement.origin(),
                 stream,
-                moved,
+                moved: moved.joined(body.moved),
                 vertices: body.vertices,
                 is_cloud: body.is_cloud,
             });
