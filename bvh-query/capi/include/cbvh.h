@@ -267,6 +267,9 @@ typedef struct cbvh_bake_options {
     int32_t drop_nan;
     /* Must be 0. */
     int32_t reserved;
+    /* How coordinates are rounded: "f32" rounds each to the nearest float, ties to even, so that coordinates which are equal in
+     * two meshes stay equal; "none" or NULL leaves them. */
+    const char *round;
 } cbvh_bake_options;
 
 /* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes

@@ -239,6 +239,7 @@ struct BakeOptions {
     std::string profile;
     std::string triangles;
     std::string effort;
+    std::string round;
     std::string scratch;
     double max_error = 0;
     std::uint64_t max_memory = 0;
@@ -263,6 +264,7 @@ struct BakeOptions {
         options.profile = text("options.profile", profile);
         options.triangles = text("options.triangles", triangles);
         options.effort = text("options.effort", effort);
+        options.round = text("options.round", round);
         options.scratch = text("options.scratch", scratch);
         options.max_error = max_error;
         options.max_memory = max_memory;

@@ -9,7 +9,7 @@ use crate::status::{Failure, Status};
 use crate::types::{BakeChoices, MeshHandle};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{
-    BakeError, Effort, FileBake, MAX_RADIUS, Options, Outcome, Profile, TriangleEncoding, to_bytes,
+    BakeError, Effort, FileBake, MAX_RADIUS, Options, Outcome, Profile, Rounding, TriangleEncoding, to_bytes,
 };
 use bvh_query::{Bvh, OwnedShape};
 use std::cell::RefCell;
@@ -57,6 +57,7 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
     let profile = text("options.profile", given.profile)?;
     let triangles = text("options.triangles", given.triangles)?;
     let effort = text("options.effort", given.effort)?;
+    let round = text("options.round", given.round)?;
     let of_name = |name: &str| encodings.into_iter().find(|encoding| encoding.name() == name);
     let max_error = if given.max_error == 0.0 { None } else { Some(given.max_error) };
     if let Some(found) = max_error
@@ -74,6 +75,10 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
             named("effort", effort, &Effort::ALL.map(Effort::name), Effort::from_name)?.unwrap_or_default(),
         )
         .max_error(max_error)
+        .round(
+            named("round", round, &Rounding::ALL.map(Rounding::name), Rounding::from_name)?
+                .unwrap_or_default(),
+        )
         .split_objects(flag("options.split_objects", given.split_objects)?)
         .scene(flag("options.scene", given.scene)?)
         .ids(!flag("options.no_ids", given.no_ids)?)

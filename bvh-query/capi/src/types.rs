@@ -70,6 +70,7 @@ structures! {
         allow_outside: i32,
         drop_nan: i32,
         reserved: i32,
+        round: *const c_char,
     }
     RobotChoices {
         size: usize,

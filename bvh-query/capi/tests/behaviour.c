@@ -1033,6 +1033,28 @@ static void stated_radius(const char *folder) {
 }
 
 /* Attached instances follow their parents, in poses and on motions, and a mesh that is swapped keeps the rest. */
+/* On request, coordinates are the nearest floats. That of 1000.3 is below it, so that the triangle does not reach it as it is
+ * given. */
+static void rounding(void) {
+    const double far[] = {1000.3, 0, 0, 1000.4, 0, 0, 1000.3, 0.1, 0}, at[] = {(double)1000.3f, 0, 0};
+    const uint32_t face[] = {0, 1, 2};
+    const cbvh_bake_options to_float = {.size = sizeof to_float, .round = "f32"};
+    cbvh_mesh mesh, dot;
+    bool touches = false;
+    OK(cbvh_bake(far, 3, face, 1, &to_float, &mesh));
+    OK(cbvh_bake_cloud(at, 1, &dot));
+    const cbvh_pose here = shift(0, 0, 0);
+    OK(cbvh_collide(querier, mesh, dot, &here, 1, &touches));
+    CHECK(touches);
+    OK(cbvh_mesh_free(mesh));
+    const cbvh_bake_options as_given = {.size = sizeof as_given, .round = "none"};
+    OK(cbvh_bake(far, 3, face, 1, &as_given, &mesh));
+    OK(cbvh_collide(querier, mesh, dot, &here, 1, &touches));
+    CHECK(!touches);
+    OK(cbvh_mesh_free(mesh));
+    OK(cbvh_mesh_free(dot));
+}
+
 static void attached(void) {
     const cbvh_mesh one = cube(1), large = cube(6);
     cbvh_scene scene, copy;
@@ -1229,6 +1251,7 @@ int main(int count, char **arguments) {
     margins();
     stated_radius(arguments[1]);
     attached();
+    rounding();
     files(arguments[1], arguments[2]);
     OK(cbvh_querier_free(querier));
     puts("behaviour: as the header says");

@@ -264,6 +264,7 @@ static void bakes(void) {
     OPTION(triangles, "small", "options.triangles: expected NULL or one of f32, packed, quantized, found \"small\"");
     OPTION(effort, "low", "options.effort: expected NULL or one of fast, default");
     OPTION(effort, "\xFF", "options.effort: expected text in UTF-8");
+    OPTION(round, "f16", "options.round: expected NULL or one of none, f32, found \"f16\"");
     OPTION(max_error, -1, "options.max_error: expected 0 or a finite length above 0");
     OPTION(radius, -1, "options.radius: expected a length from 0 to 2^118, found -1");
     OPTION(radius, NAN, "options.radius: expected");
@@ -275,7 +276,7 @@ static void bakes(void) {
     OPTION(scene, 1, "options.scene: expected nothing");
     OPTION(max_memory, 1, "options.max_memory: expected nothing");
     FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &(cbvh_bake_options){.size = 8}, &made), CBVH_INVALID_ARGUMENT,
-          "options.size: expected 104");
+          "options.size: expected 112");
     const char *missing = "/no such folder/x.obj";
     FAILS(cbvh_bake_files(&missing, 1, "/no such folder/x.cbvh", NULL, NULL), CBVH_SYSTEM, "x.obj");
     FAILS(cbvh_mesh_open("/no such folder/x.cbvh", CBVH_READ, &made), CBVH_SYSTEM, "x.cbvh");

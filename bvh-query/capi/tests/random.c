@@ -85,7 +85,8 @@ static const void *any_options(bool of_bake) {
     if (of_bake) {
         options->bake = (cbvh_bake_options){.size = size ? size : sizeof options->bake, .profile = names[below(7)],
             .triangles = names[below(7)], .effort = below(2) ? NULL : names[below(7)],
-            .max_error = below(2) ? 0 : any_number(), .no_ids = any_flag(), .force = below(8) == 0};
+            .round = below(2) ? NULL : names[below(7)], .max_error = below(2) ? 0 : any_number(), .no_ids = any_flag(),
+            .force = below(8) == 0};
         return below(5) ? options : NULL;
     }
     switch (below(4)) {

@@ -100,6 +100,10 @@ void handles() {
     cbvh::BakeOptions options;
     options.profile = "dop7";
     FAILS(cbvh::Mesh::bake({}, {}, options), CBVH_INVALID_ARGUMENT, "options.profile");
+    options.profile.clear();
+    options.round = "f16";
+    FAILS(cbvh::Mesh::bake({}, {}, options), CBVH_INVALID_ARGUMENT, "options.round");
+    options.round.clear();
     // Text is not cut at a zero byte.
     const std::string cut("a\0b", 3);
     options.profile = cut;

@@ -5,7 +5,7 @@ use crate::asking::{detached, on_pool};
 use crate::errors::{BakeError, bake_error};
 use crate::mesh::Mesh;
 use bvh_bake::mesh::Mesh as Triangles;
-use bvh_bake::{Effort, FileBake, Options, Outcome, Profile, TriangleEncoding, to_bytes};
+use bvh_bake::{Effort, FileBake, Options, Outcome, Profile, Rounding, TriangleEncoding, to_bytes};
 use bvh_query::Bvh;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -19,6 +19,7 @@ pub(crate) struct BakeOptions {
     profile: Option<String>,
     triangles: Option<String>,
     max_error: Option<f64>,
+    round: Option<String>,
     effort: Option<String>,
     ids: bool,
     topology: bool,
@@ -49,6 +50,11 @@ impl BakeOptions {
             let encoding = TriangleEncoding::ALL.into_iter().find(|encoding| encoding.name() == name);
             let known = TriangleEncoding::ALL.map(TriangleEncoding::name);
             options = options.triangles(encoding.ok_or_else(|| unknown("triangles", name, &known))?);
+        }
+        if let Some(name) = &self.round {
+            let round = Rounding::from_name(name);
+            options = options
+                .round(round.ok_or_else(|| unknown("round", name, &Rounding::ALL.map(Rounding::name)))?);
         }
         if let Some(name) = &self.effort {
             let effort = Effort::from_name(name);

@@ -47,6 +47,21 @@ class Triangles(unittest.TestCase):
         self.assertEqual(mesh.triangle_count, 38)
         self.check(mesh, vertices, faces)
 
+    def test_coordinates_are_rounded_as_numpy_rounds_them(self):
+        random_numbers = np.random.default_rng(2)
+        vertices = 10.0 ** random_numbers.uniform(-6, 6, (90, 3)) * random_numbers.choice([-1, 1], (90, 3))
+        faces = np.arange(90).reshape(30, 3)
+        rounded = vertices.astype(np.float32).astype(float)
+        self.check(cbvh.bake(vertices, faces, round="f32"), rounded, faces)
+        with tempfile.TemporaryDirectory() as folder:
+            source = pathlib.Path(folder) / "mesh.obj"
+            lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+            lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+            source.write_text("\n".join(lines))
+            mesh = cbvh.bake_files(source, source.with_suffix(".cbvh"), round="f32")
+            self.check(mesh, rounded, faces)
+            del mesh  # Windows removes no file that is open.
+
     def test_ids_of_answers_are_rows(self):
         vertices, faces = read_obj(TESTDATA / "fclenv.obj")
         mesh, corners = cbvh.bake(vertices, faces), vertices[faces]

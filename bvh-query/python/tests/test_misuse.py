@@ -51,6 +51,7 @@ class BadArguments(unittest.TestCase):
             (ValueError, "max_error: expected a finite", lambda: cbvh.bake(vertices, faces, triangles="quantized", max_error=-1)),
             (ValueError, "max_error: expected a finite", lambda: cbvh.bake(vertices, faces, triangles="quantized", max_error=np.nan)),
             (TypeError, "max_error: expected a number", lambda: cbvh.bake(vertices, faces, max_error="x")),
+            (TypeError, "round: expected a str", lambda: cbvh.bake(vertices, faces, round=32)),
             (ValueError, "inputs: expected at least one file", cbvh.bake_files, [], "x.cbvh"),
             (TypeError, "inputs: expected a path", cbvh.bake_files, 5, "x.cbvh"),
             (TypeError, "max_memory: expected bytes", lambda: cbvh.bake_files("x.obj", "x.cbvh", max_memory=1e9)),
@@ -82,7 +83,7 @@ class BadArguments(unittest.TestCase):
             (ValueError, "b: expected a rotation", cbvh.relative, one, scaled),
         ]
         check_errors(self, cases)
-        for options in ({"profile": "dop7"}, {"triangles": "small"}, {"effort": "low"}):
+        for options in ({"profile": "dop7"}, {"triangles": "small"}, {"round": "f16"}, {"effort": "low"}):
             with self.assertRaisesRegex(ValueError, f"{next(iter(options))}: expected one of"):
                 cbvh.bake(vertices, faces, **options)
         with self.assertRaisesRegex(ValueError, "parallel"):

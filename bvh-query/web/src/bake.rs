@@ -3,7 +3,7 @@
 use crate::arguments::{Answer, bytes, refused, room, rows, wrong};
 use crate::mesh::Mesh;
 use bvh_bake::mesh::Mesh as Triangles;
-use bvh_bake::{Effort, MeshFormat, Options, Profile, TriangleEncoding, input, to_bytes_with};
+use bvh_bake::{Effort, MeshFormat, Options, Profile, Rounding, TriangleEncoding, input, to_bytes_with};
 use bvh_query::Bvh;
 use js_sys::{Float64Array, Function, Reflect, Uint8Array, Uint32Array};
 use std::path::Path;
@@ -28,6 +28,7 @@ fn options(given: &JsValue) -> Answer<Options> {
     let known = &TriangleEncoding::ALL;
     let triangles = named("triangles", text("triangles"), known, |encoding| encoding.name())?;
     let effort = named("effort", text("effort"), &Effort::ALL, |effort| effort.name())?;
+    let round = named("round", text("round"), &Rounding::ALL, |round| round.name())?;
     let max_error = get("maxError").as_f64();
     if let Some(found) = max_error {
         if triangles != Some(TriangleEncoding::Quantized) {
@@ -47,6 +48,7 @@ fn options(given: &JsValue) -> Answer<Options> {
         .triangles(triangles)
         .effort(effort.unwrap_or_default())
         .max_error(max_error)
+        .round(round.unwrap_or_default())
         .ids(flag("ids"))
         .topology(flag("topology"))
         .radius(get("radius").as_f64().unwrap_or(0.0))

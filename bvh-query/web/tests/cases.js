@@ -518,6 +518,10 @@ export const cases = {
         const thick = bake({ radius: 0.25, solid: true });
         equal([thick.radius, thick.isSolid], [0.25, true]);
         equal(thick.distance(bake({}), cbvh.pose([3, 0, 0])).distance, 0.75);
+        const far = [1000.2, 0, 0, 1000.3, 0, 0, 1000.2, 0.1, 0];
+        const rounded = cbvh.Mesh.bake(Float64Array.from(far), [0, 1, 2], { round: "f32" });
+        equal(Array.from(rounded.triangles()), far.map(Math.fround));
+        ok(/none, f32/.test(refused(() => bake({ round: "f16" }))), "the ways to round");
         ok(/2\^118/.test(refused(() => bake({ radius: -1 }))), "radii");
         const warnings = [];
         const given = { dropNan: true, onWarning: (warning) => warnings.push(warning) };

@@ -44,6 +44,9 @@ export interface BakeOptions {
     triangles?: string;
     /** With triangles "quantized", how far a vertex may move, in mesh units. */
     maxError?: number;
+    /** How coordinates are rounded: "f32" rounds each to the nearest float32 number, ties to even, so that coordinates which are
+     * equal in two meshes stay equal. "none" by default. */
+    round?: string;
     /** The time spent on a better tree: "fast" or "default". */
     effort?: string;
     /** Whether triangles keep their numbers from the input; else the baker numbers them in its own order. True by default. */
@@ -126,6 +129,7 @@ function checked(options: BakeOptions): BakeOptions {
         ["triangles", "string"],
         ["maxError", "number"],
         ["effort", "string"],
+        ["round", "string"],
         ["ids", "boolean"],
         ["topology", "boolean"],
         ["radius", "number"],

@@ -22,6 +22,7 @@ def _options(
     profile: str | None,
     triangles: str | None,
     max_error: float | None,
+    round: str | None,
     effort: str | None,
     ids: bool,
     topology: bool,
@@ -29,7 +30,7 @@ def _options(
     solid: bool,
     drop_nan: bool = False,
 ) -> dict[str, Any]:
-    for name, text in (("profile", profile), ("triangles", triangles), ("effort", effort)):
+    for name, text in (("profile", profile), ("triangles", triangles), ("round", round), ("effort", effort)):
         if text is not None and not isinstance(text, str):
             raise TypeError(f"{name}: expected a str or None, found {type(text).__name__}")
     for name, choice in (("ids", ids), ("topology", topology), ("solid", solid), ("drop_nan", drop_nan)):
@@ -50,6 +51,7 @@ def _options(
         "profile": profile,
         "triangles": triangles,
         "max_error": max_error,
+        "round": round,
         "effort": effort,
         "ids": bool(ids),
         "topology": bool(topology),
@@ -72,6 +74,7 @@ def bake(
     profile: str | None = None,
     triangles: str | None = None,
     max_error: float | None = None,
+    round: str | None = None,
     effort: str | None = None,
     ids: bool = True,
     topology: bool = True,
@@ -84,7 +87,8 @@ def bake(
     ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose.
     Without ``ids``, the baker numbers triangles in its own order. Without ``topology``, there are no answers about what
     is inside. ``radius`` and ``solid`` are those of `Mesh.rounded` and `Mesh.solid`, and stay in the file. Baking takes
-    about a microsecond per triangle. `Mesh.save` writes the result.
+    about a microsecond per triangle. `Mesh.save` writes the result. ``round="f32"`` rounds each coordinate to the nearest float32
+    number, ties to even, as games store them: coordinates that are equal in two meshes then stay equal.
 
     Vertices are stored as float32 offsets from an origin of each object. A vertex whose coordinates are float32 numbers
     does not move. Others move by at most 2^-23 of the diagonal of the object's box, or by up to ``max_error`` with
@@ -103,7 +107,7 @@ def bake(
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(points):
         found = f"{numbers.min()} to {numbers.max()}"
         raise ValueError(f"faces: expected numbers from 0 to {len(points) - 1}, found {found}")
-    options = _options(profile, triangles, max_error, effort, ids, topology, radius, solid)
+    options = _options(profile, triangles, max_error, round, effort, ids, topology, radius, solid)
     return Mesh(_cbvh.bake(points, np.require(numbers, np.uint32, ["C", "ALIGNED"]), options))
 
 
@@ -114,6 +118,7 @@ def bake_files(
     profile: str | None = None,
     triangles: str | None = None,
     max_error: float | None = None,
+    round: str | None = None,
     effort: str | None = None,
     ids: bool = True,
     topology: bool = True,
@@ -140,7 +145,7 @@ def bake_files(
     files = [os.fsdecode(file) for file in inputs]
     if not files:
         raise ValueError("inputs: expected at least one file, found none")
-    options = _options(profile, triangles, max_error, effort, ids, topology, radius, solid, drop_nan)
+    options = _options(profile, triangles, max_error, round, effort, ids, topology, radius, solid, drop_nan)
     if max_memory is not None:
         try:
             max_memory = operator.index(max_memory)
