@@ -609,11 +609,12 @@ cbvh_status cbvh_penetrations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, co
 /* How two parts of an assembly lie. */
 typedef int32_t cbvh_clash_class;
 enum {
-    /* Their surfaces are farther apart than the clearance, and neither is inside the other. */
+    /* Their surfaces are farther apart than the clearance and the tolerance, and neither is inside the other. */
     CBVH_CLASH_APART = 0,
-    /* Their surfaces do not touch, but are at most the clearance apart. */
+    /* Their surfaces are farther apart than the tolerance, but at most the clearance. */
     CBVH_CLASH_NEAR = 1,
-    /* They have points in common, and their depth is at most the tolerance. */
+    /* Their surfaces are at most the tolerance apart, or they have points in common and their depth is at most the
+     * tolerance. */
     CBVH_CLASH_TOUCHING = 2,
     /* Their depth exceeds the tolerance. */
     CBVH_CLASH_OVERLAPPING = 3,
@@ -631,13 +632,15 @@ enum {
 typedef struct cbvh_clash {
     cbvh_clash_class kind;
     cbvh_relation relation;
-    /* For near parts, how far apart their surfaces are; infinite for parts that are apart, and 0 for all others. */
+    /* For near parts, and for touching ones without a common point: how far apart their surfaces are. Infinite for parts
+     * that are apart, and 0 for all others. */
     double distance;
     /* A point of the clash in A's frame: between the closest points, in both parts, or in contact. 0 for parts that are
      * apart. */
     double point[3];
-    /* For parts that touch, overlap or are undecided: the bounds of their depth. NaN for all others. `is_spent` is 1 if
-     * the visits of the options or the budget of the querier ended the search. */
+    /* For parts that touch, overlap or are undecided: the bounds of their depth, both 0 without a common point. NaN for all
+     * others, and for parts that are not closed. `is_spent` is 1 if the visits of the options or the budget of the querier
+     * ended the search. */
     cbvh_penetration depth;
 } cbvh_clash;
 
@@ -646,8 +649,8 @@ typedef struct cbvh_clash_options {
     size_t size;
     /* Parts at most this far apart are near: finite, at least 0; 0 looks for no near parts. */
     double clearance;
-    /* Parts overlap if they do so by more than this depth: finite, above 0; 0 for a millionth of the largest side of both
-     * parts. */
+    /* Parts at most this far apart, or at most this deep in each other, are touching: finite, above 0; 0 for a millionth of
+     * the largest side of both parts. */
     double tolerance;
     /* The search for a depth ends when the upper bound exceeds the lower one by no more than this part of it: finite,
      * above 0; 0 for 0.1. */
@@ -656,9 +659,9 @@ typedef struct cbvh_clash_options {
     uint64_t visits;
 } cbvh_clash_options;
 
-/* Answers how two parts lie: apart, near, touching, overlapping, one in the other, or twice in one place. Parts that touch
- * are told apart from parts that overlap by their depth (cbvh_penetrations): flush faces overlap by roundings in nearly
- * all poses, so that a tolerance is part of the question. Where a part fits another one without a gap, like a peg in its
+/* Answers how two parts lie: apart, near, touching, overlapping, one in the other, or twice in one place. Flush faces overlap
+ * or come apart by roundings in nearly all poses, so that a tolerance is part of the question: parts that are no farther
+ * apart and no deeper in each other (cbvh_penetrations) are touching. Where a part fits another one without a gap, like a peg in its
  * hole, the depth is mostly undecided. One core is used. CBVH_INVALID_ARGUMENT for a file that was baked without
  * topology, where the question is about the inside; CBVH_LIMIT if the budget does not suffice for the rest of the
  * question. */

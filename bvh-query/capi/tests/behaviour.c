@@ -131,6 +131,7 @@ static void clashes(void) {
     } cases[] = {
         {one, 1.375, 0.125, CBVH_CLASH_APART, INFINITY, NAN},
         {one, 1.0625, 0.125, CBVH_CLASH_NEAR, 0.0625, NAN},
+        {one, 1 + 0x1p-11, 0.125, CBVH_CLASH_TOUCHING, 0x1p-11, 0},
         {one, 1, 0.125, CBVH_CLASH_TOUCHING, 0, 0},
         {one, 0.75, 0.125, CBVH_CLASH_OVERLAPPING, 0, 0.25},
         {quarter, 0.125, 0.125, CBVH_CLASH_CONTAINED, 0, NAN},
@@ -1032,7 +1033,6 @@ static void stated_radius(const char *folder) {
     OK(cbvh_mesh_free(mesh));
 }
 
-/* Attached instances follow their parents, in poses and on motions, and a mesh that is swapped keeps the rest. */
 /* On request, coordinates are the nearest floats. That of 1000.3 is below it, so that the triangle does not reach it as it is
  * given. */
 static void rounding(void) {
@@ -1055,6 +1055,7 @@ static void rounding(void) {
     OK(cbvh_mesh_free(dot));
 }
 
+/* Attached instances follow their parents, in poses and on motions, and a mesh that is swapped keeps the rest. */
 static void attached(void) {
     const cbvh_mesh one = cube(1), large = cube(6);
     cbvh_scene scene, copy;
@@ -1250,8 +1251,8 @@ int main(int count, char **arguments) {
     solids();
     margins();
     stated_radius(arguments[1]);
-    attached();
     rounding();
+    attached();
     files(arguments[1], arguments[2]);
     OK(cbvh_querier_free(querier));
     puts("behaviour: as the header says");

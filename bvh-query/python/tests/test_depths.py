@@ -154,6 +154,7 @@ class Depths(unittest.TestCase):
         cases = [
             (self.cube, (1.375, 0.125, 0), kind.APART, np.inf, None),
             (self.cube, (1.0625, 0.125, 0), kind.NEAR, 0.0625, None),
+            (self.cube, (1 + 2.0**-11, 0.125, 0), kind.TOUCHING, 2.0**-11, 0),
             (self.cube, (1, 0.125, 0), kind.TOUCHING, 0, 0),
             (self.cube, (0.75, 0.125, 0), kind.OVERLAPPING, 0, 0.25),
             (self.small, (0.125, 0.125, 0), kind.CONTAINED, 0, None),
@@ -173,23 +174,26 @@ class Depths(unittest.TestCase):
             if expected == kind.NEAR:
                 self.assertEqual(found.point[0], 0.53125)
             else:
-                self.assertTrue(np.abs(found.point).max() <= 0.5 + 1e-9)
+                self.assertTrue(np.abs(found.point).max() <= 0.5 + 2.0**-12)
         self.assertIs(self.small.clash(self.cube, np.eye(4)).relation, cbvh.Relation.A_IN_B)
         # Of two cubes side by side, the depth is known, and with it the class.
         offsets = np.random.default_rng(8).uniform(-1.5, 1.5, (200, 3))
         poses, gaps = shifts(*offsets), np.abs(offsets) - 1
         depths, apart = -gaps.max(axis=1), np.linalg.norm(np.maximum(gaps, 0), axis=1)
         found = self.cube.clash(self.cube, poses, clearance=0.25, tolerance=0.1, relative_gap=1e-3)
-        near = np.where(apart > 0.25, kind.APART, kind.NEAR)
+        near = np.where(apart > 0.25, kind.APART, np.where(apart > 0.1, kind.NEAR, kind.TOUCHING))
         known = np.where(depths < 0, near, np.where(depths > 0.1, kind.OVERLAPPING, kind.TOUCHING))
         np.testing.assert_array_equal(found.kind, known)
         self.assertEqual(len(set(known.tolist())), 4)
-        is_near = known == kind.NEAR
+        is_near = (depths < 0) & (known != kind.APART)
         np.testing.assert_allclose(found.distance[is_near], apart[is_near])
+        is_touching = is_near & (known == kind.TOUCHING)
+        self.assertTrue(0 < np.count_nonzero(is_touching) < np.count_nonzero(known == kind.TOUCHING))
+        self.assertTrue(np.all(found.depth.upper[is_touching] == 0))
         is_deep = depths >= 0
         self.assertTrue(np.all(found.depth.lower[is_deep] <= depths[is_deep] + 1e-12))
         self.assertTrue(np.all(found.depth.upper[is_deep] >= depths[is_deep] - 1e-12))
-        self.assertTrue(np.isnan(found.depth.point[~is_deep]).all())
+        self.assertTrue(np.isnan(found.depth.point[~is_deep & ~is_touching]).all())
         self.assertEqual(str(found.kind[:0]), "[]")
         self.assertIn("OVERLAPPING", str(found.kind))
         parallel = self.cube.clash(self.cube, poses, clearance=0.25, tolerance=0.1, relative_gap=1e-3, parallel=True)

@@ -5,10 +5,10 @@ use crate::pose::Pose;
 use crate::traverse::placement::POSE_ERROR;
 use bvh_format::object::Object;
 
-/// Returns the largest side of the boxes of a shape's objects, in mesh units.
-pub(crate) fn size(side: Shape<'_>) -> f64 {
+/// Returns the largest side of the boxes of objects, in mesh units.
+pub(crate) fn size(objects: &[Object]) -> f64 {
     let of = |object: &Object| half_sides(object).into_iter().fold(0.0, f64::max);
-    2.0 * side.objects().iter().map(of).fold(0.0, f64::max)
+    2.0 * objects.iter().map(of).fold(0.0, f64::max)
 }
 
 /// Returns half of each side of an object's box, in mesh units.

@@ -309,5 +309,5 @@ impl Tracker {
 
 /// Returns whether a motion is known and a small step.
 fn is_small(moved: Option<f64>, b: Shape<'_>) -> bool {
-    moved.is_some_and(|moved| moved <= MAX_STEP_PER_SIZE * size(b))
+    moved.is_some_and(|moved| moved <= MAX_STEP_PER_SIZE * size(b.objects()))
 }

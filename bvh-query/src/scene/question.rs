@@ -5,6 +5,7 @@ use crate::file::shape::Shape;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, Distance, Relation};
 use crate::query::depth::clash::{Clash, ClashClass, ClashOptions};
+use crate::query::displacement::size;
 use crate::query::options::check_distance;
 use crate::query::querier::Querier;
 use crate::query::tracker::Tracker;
@@ -183,8 +184,11 @@ impl Scene {
         is_asked: impl Fn(ScenePair) -> bool,
     ) -> Result<Vec<SceneClash>, SceneError> {
         options.check()?;
+        // Without a tolerance of its own, a pair has that of its larger part.
+        let sizes = self.contents.each().map(|(_, instance)| size(instance.shape.objects()));
+        let reach = options.clearance.max(options.tolerance_of(sizes.fold(0.0, f64::max)));
         let mut all = Vec::new();
-        self.each_piece(options.clearance, &mut |scene, mut near_pairs| {
+        self.each_piece(reach, &mut |scene, mut near_pairs| {
             near_pairs.retain(|near_pair| is_asked(scene.ids(near_pair.a, near_pair.b)));
             all.extend(scene.each(&near_pairs, |querier, pair| {
                 let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;

@@ -221,9 +221,12 @@ export const cases = {
         const spent = cube.clash(cube, at(1.9375, 0.25, 0.125), { ...options, visits: 200 });
         equal([ClashClass[spent.kind], spent.depth.isSpent], ["UNDECIDED", true]);
         ok(spent.depth.lower <= 0.0625 && spent.depth.upper >= 0.0625, "bounds around the depth");
+        const gap = cube.clash(cube, at(2 + 2 ** -10, 0.25, 0.125), options);
+        equal([ClashClass[gap.kind], gap.distance, gap.depth.lower, gap.depth.upper], ["TOUCHING", 2 ** -10, 0, 0]);
         // By default nothing is near, and the tolerance is 2e-6.
         equal(cube.clash(cube, at(2.125, 0, 0)).kind, ClashClass.APART);
         equal(cube.clash(cube, at(2 - 1e-6, 0.25, 0.125)).kind, ClashClass.TOUCHING);
+        equal(cube.clash(cube, at(2 + 1e-6, 0.25, 0.125)).kind, ClashClass.TOUCHING);
         equal(cube.clash(cube, at(2 - 4e-6, 0.25, 0.125)).kind, ClashClass.OVERLAPPING);
 
         const scene = new Scene();
@@ -515,13 +518,13 @@ export const cases = {
         const sizes = ["f32", "packed", "quantized"].map((triangles) => bake({ triangles }).byteLength);
         ok(sizes[0] >= sizes[1] && sizes[1] >= sizes[2], `smaller files, found ${sizes}`);
         bake({ profile: "dop14-u8", effort: "fast", ids: false, topology: false, triangles: "quantized", maxError: 0.01 });
-        const thick = bake({ radius: 0.25, solid: true });
-        equal([thick.radius, thick.isSolid], [0.25, true]);
-        equal(thick.distance(bake({}), cbvh.pose([3, 0, 0])).distance, 0.75);
         const far = [1000.2, 0, 0, 1000.3, 0, 0, 1000.2, 0.1, 0];
         const rounded = cbvh.Mesh.bake(Float64Array.from(far), [0, 1, 2], { round: "f32" });
         equal(Array.from(rounded.triangles()), far.map(Math.fround));
         ok(/none, f32/.test(refused(() => bake({ round: "f16" }))), "the ways to round");
+        const thick = bake({ radius: 0.25, solid: true });
+        equal([thick.radius, thick.isSolid], [0.25, true]);
+        equal(thick.distance(bake({}), cbvh.pose([3, 0, 0])).distance, 0.75);
         ok(/2\^118/.test(refused(() => bake({ radius: -1 }))), "radii");
         const warnings = [];
         const given = { dropNan: true, onWarning: (warning) => warnings.push(warning) };

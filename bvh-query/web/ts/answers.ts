@@ -141,11 +141,11 @@ export interface Penetrations {
 
 /** How two parts of an assembly lie. `ClashClass[number]` is its name. */
 export enum ClashClass {
-    /** Their surfaces are farther apart than the clearance, and neither is inside the other. */
+    /** Their surfaces are farther apart than the clearance and the tolerance, and neither is inside the other. */
     APART = 0,
-    /** Their surfaces do not touch, but are at most the clearance apart. */
+    /** Their surfaces are farther apart than the tolerance, but at most the clearance. */
     NEAR = 1,
-    /** They have points in common, and their depth is at most the tolerance. */
+    /** Their surfaces are at most the tolerance apart, or they have points in common and their depth is at most the tolerance. */
     TOUCHING = 2,
     /** Their depth exceeds the tolerance. */
     OVERLAPPING = 3,
@@ -165,12 +165,14 @@ export interface Clash {
     kind: ClashClass;
     /** Whether they touch and, if not, whether one is inside the other. */
     relation: Relation;
-    /** For near parts, how far apart their surfaces are; infinite for parts that are apart, and 0 for all others. */
+    /** For near parts, and for touching ones without a common point: how far apart their surfaces are. Infinite for parts that are
+     * apart, and 0 for all others. */
     distance: number;
     /** A point of the clash in the frame of the first mesh: between the closest points, in both parts, or in contact. 0 for parts
      * that are apart. */
     point: Float64Array;
-    /** For parts that touch, overlap or are undecided: the bounds of their depth. */
+    /** For parts that touch, overlap or are undecided: the bounds of their depth, both 0 without a common point. Parts that are not
+     * closed have none. */
     depth: Penetration | undefined;
 }
 

@@ -86,7 +86,8 @@ export interface PenetrationOptions {
 export interface ClashOptions {
     /** Parts at most this far apart are near. 0, the default, looks for no near parts. */
     clearance?: number;
-    /** Parts overlap if they do so by more than this depth; by default a millionth of the largest side of both parts. */
+    /** Parts at most this far apart, or at most this deep in each other, are touching; by default a millionth of the largest side of
+     * both parts. */
     tolerance?: number;
     /** The search for a depth ends when the upper bound exceeds the lower one by no more than this part of it: above 0. 0.1 by
      * default. */
@@ -128,8 +129,8 @@ function checked(options: BakeOptions): BakeOptions {
         ["profile", "string"],
         ["triangles", "string"],
         ["maxError", "number"],
-        ["effort", "string"],
         ["round", "string"],
+        ["effort", "string"],
         ["ids", "boolean"],
         ["topology", "boolean"],
         ["radius", "number"],
@@ -437,9 +438,9 @@ export class Mesh extends Handle<raw.Mesh> {
     }
 
     /**
-     * How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place? Parts that touch are told
-     * apart from parts that overlap by their depth, which is that of `penetration`: flush faces overlap by roundings in nearly all
-     * poses, so that a tolerance is part of the question. Meshes need not be closed.
+     * How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place? Flush faces overlap or come
+     * apart by roundings in nearly all poses, so that a tolerance is part of the question: parts that are no farther apart and no
+     * deeper in each other, by the depth of `penetration`, are touching. Meshes need not be closed.
      */
     clash(other: Mesh, pose: Numbers, options: ClashOptions = {}): Clash {
         return answers.onlyClash(this.clashEach(other, onePose(pose), options));

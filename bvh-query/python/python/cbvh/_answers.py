@@ -93,9 +93,10 @@ class SelfContactKind(_Named):
 class ClashClass(_Named):
     """How two parts of an assembly lie.
 
-    - ``APART``: their surfaces are farther apart than the clearance, and neither is inside the other.
-    - ``NEAR``: their surfaces do not touch, but are at most the clearance apart.
-    - ``TOUCHING``: they have points in common, and their depth is at most the tolerance.
+    - ``APART``: their surfaces are farther apart than the clearance and the tolerance, and neither is inside the other.
+    - ``NEAR``: their surfaces are farther apart than the tolerance, but at most the clearance.
+    - ``TOUCHING``: their surfaces are at most the tolerance apart, or they have points in common and their depth is at most
+      the tolerance.
     - ``OVERLAPPING``: their depth exceeds the tolerance.
     - ``CONTAINED``: one is wholly inside the other.
     - ``DUPLICATED``: both are the same part in the same place, to within the tolerance.
@@ -178,12 +179,12 @@ class Clash(NamedTuple):
 
     - ``kind``: a `ClashClass` or, for N poses, their numbers as uint8, shape (N,), printed as names.
     - ``relation``: whether they touch and, if not, whether one is inside the other: a `Relation`, or numbers likewise.
-    - ``distance``: for near parts, how far apart their surfaces are, in mesh units; infinite for parts that are apart, and 0
-      for all others. Shape () or (N,).
+    - ``distance``: for near parts, and for touching ones without a common point, how far apart their surfaces are, in mesh
+      units; infinite for parts that are apart, and 0 for all others. Shape () or (N,).
     - ``point``: a point of the clash in the frame of the first mesh: between the closest points, in both parts, or in contact;
       0 for parts that are apart. Shape (3,) or (N, 3).
-    - ``depth``: for parts that touch, overlap or are undecided, the bounds of their depth. For all others, its numbers are
-      NaN.
+    - ``depth``: for parts that touch, overlap or are undecided, the bounds of their depth, both 0 without a common point. For
+      all others, and for parts that are not closed, its numbers are NaN.
     """
 
     kind: Any

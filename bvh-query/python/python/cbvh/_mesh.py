@@ -315,13 +315,13 @@ class Mesh:
     ) -> Clash:
         """How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place?
 
-        Parts that touch are told apart from parts that overlap by their depth, which is that of `penetration`: flush faces
-        overlap by roundings in nearly all poses, so that a tolerance is part of the question. Where a part fits another one
+        Flush faces overlap or come apart by roundings in nearly all poses, so that a tolerance is part of the question: parts
+        that are no farther apart and no deeper in each other, by the depth of `penetration`, are touching. Where a part fits another one
         without a gap, like a peg in its hole, the depth is mostly undecided. Parts need not be closed.
 
         ``poses``: of ``other`` in the frame of this mesh (body to world), shape (4, 4) or (N, 4, 4). ``clearance``: parts at
-        most this far apart are near, in mesh units; 0 looks for no near parts. ``tolerance``: parts overlap if they do so by
-        more than this depth, in mesh units; None: a millionth of the largest side of both. The search for a depth ends when
+        most this far apart are near, in mesh units; 0 looks for no near parts. ``tolerance``: parts at most this far apart, or
+        at most this deep in each other, are touching, in mesh units; None: a millionth of the largest side of both. The search for a depth ends when
         ``upper`` exceeds ``lower`` by no more than ``relative_gap`` of it, a part above 0, or after ``visits`` visits of nodes
         and triangles; None: no limit. Raises ValueError where the question is about the inside of a mesh that was baked without
         topology.

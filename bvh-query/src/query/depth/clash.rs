@@ -14,17 +14,17 @@ use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
 use crate::query::probe::relation::each_triangle;
 use crate::query::querier::Querier;
-use crate::query::rounded::limit_of_cores;
+use crate::query::rounded::{limit_of_cores, sum_of_radii};
 
 /// How two parts lie. The command and the bindings of other languages use its numbers (`class as u8`) and names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum ClashClass {
-    /// Their surfaces are farther apart than the clearance, and neither is inside the other.
+    /// Their surfaces are farther apart than the clearance and the tolerance, and neither is inside the other.
     Apart = 0,
-    /// Their surfaces do not touch, but are at most the clearance apart.
+    /// Their surfaces are farther apart than the tolerance, but at most the clearance.
     Near = 1,
-    /// They have points in common, and their depth is at most the tolerance.
+    /// Their surfaces are at most the tolerance apart, or they have points in common and their depth is at most the tolerance.
     Touching = 2,
     /// Their depth exceeds the tolerance.
     Overlapping = 3,
@@ -66,9 +66,11 @@ pub struct Clash {
     pub class: ClashClass,
     /// Whether they touch and, if not, whether one is inside the other.
     pub relation: Relation,
-    /// For near parts, how far apart their surfaces are; infinite for parts that are apart, and 0 for all others.
+    /// For near parts, and for touching ones without a common point: how far apart their surfaces are. Infinite for parts that
+    /// are apart, and 0 for all others.
     pub distance: f64,
-    /// For parts that touch, overlap or are undecided: the bounds of their depth.
+    /// For parts that touch, overlap or are undecided: the bounds of their depth, both 0 without a common point. Parts that are not
+    /// closed have none.
     pub depth: Option<Penetration>,
     /// A point of the clash in A's frame: between the closest points, in both parts, or in contact.
     pub point: [f64; 3],
@@ -80,8 +82,8 @@ pub struct Clash {
 pub struct ClashOptions {
     /// Parts at most this far apart are near, in mesh units. 0, the default, looks for no near parts.
     pub clearance: f64,
-    /// Parts overlap if they do so by more than this depth, in mesh units. `None`, the default, stands for a millionth of the
-    /// largest side of both parts.
+    /// Parts at most this far apart, or at most this deep in each other, are touching, in mesh units. `None`, the default, stands
+    /// for a millionth of the largest side of both parts.
     pub tolerance: Option<f64>,
     /// The search for a depth ends when its bounds are this near each other, as a part of the lower one.
     pub relative_gap: f64,
@@ -107,7 +109,8 @@ impl ClashOptions {
         Self { clearance, ..self }
     }
 
-    /// Takes parts for overlapping if they do so by more than a depth. A query refuses one that is negative or not finite.
+    /// Takes parts for touching if they are no farther apart and no deeper in each other than a length. A query refuses one that
+    /// is negative or not finite.
     #[must_use]
     pub fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance: Some(tolerance), ..self }
@@ -131,15 +134,24 @@ impl ClashOptions {
         PenetrationOptions::new().relative_gap(self.relative_gap).check()?;
         self.tolerance.map_or(Ok(()), |tolerance| check(NumberError::DepthTolerance, tolerance))
     }
+
+    /// Returns the tolerance for parts, one of which has this largest side.
+    pub(crate) fn tolerance_of(&self, size: f64) -> f64 {
+        self.tolerance.unwrap_or(1e-6 * size)
+    }
 }
 
 impl Querier {
     /// Returns how two parts lie, with B placed by a pose in A's frame.
     ///
-    /// Parts that touch are told apart from parts that overlap by their depth ([`Querier::penetration`]): flush faces overlap by
-    /// roundings in nearly all poses, so a tolerance is part of the question. Where a part fits another one without a gap, like
-    /// a peg in its hole, the depth is mostly undecided: `lower` is at most the tolerance, and `upper` how far it has to be
-    /// pulled.
+    /// A tolerance is part of the question. A pose that turns by anything but right angles rounds each vertex that it places, by
+    /// about 1e-16 of its coordinates, so that flush faces overlap or come apart by as much. Both count as touching: parts within
+    /// the tolerance of each other, which is exact as [`Querier::within`] is, and parts whose depth ([`Querier::penetration`]) is at
+    /// most the tolerance. Where a part fits another one without a gap, like a peg in its hole, the depth is mostly undecided:
+    /// `lower` is at most the tolerance, and `upper` how far it has to be pulled.
+    ///
+    /// Cost: that of `within` with the tolerance or the clearance, whichever is larger, for parts that are farther apart than
+    /// both. Others also take `collide`, and a `distance` or a `penetration`.
     ///
     /// # Errors
     /// [`QueryError::Number`] if an option is invalid; else the errors of [`Querier::relation`].
@@ -162,26 +174,45 @@ impl Querier {
         pose: &Pose,
         options: &ClashOptions,
     ) -> Result<Clash, QueryError> {
-        let tolerance = options.tolerance.unwrap_or_else(|| 1e-6 * size(a).max(size(b)));
-        let relation = self.relation_of(a, b, pose)?;
+        let tolerance = options.tolerance_of(size(a.objects()).max(size(b.objects())));
+        let reach = tolerance.max(options.clearance);
+        // Most pairs are apart, and this question says so.
+        let is_within_reach = self.cores_within(a, b, pose, limit_of_cores(a, b, reach))?;
+        let touches =
+            is_within_reach && (reach == 0.0 || self.cores_within(a, b, pose, sum_of_radii(a, b))?);
+        let relation = if touches { Relation::Touching } else { self.relation_of_disjoint(a, b, pose)? };
         let clash = |class, point| Clash { class, relation, distance: 0.0, depth: None, point };
-        if matches!(relation, Relation::Apart | Relation::Undefined) {
-            return self.near_or_apart(a, b, pose, (options.clearance, relation));
+        let is_disjoint = matches!(relation, Relation::Apart | Relation::Undefined);
+        if is_disjoint && !is_within_reach {
+            return Ok(Clash { distance: f64::INFINITY, ..clash(ClashClass::Apart, [0.0; 3]) });
+        }
+        if is_disjoint
+            && tolerance < reach
+            && (tolerance == 0.0 || !self.cores_within(a, b, pose, limit_of_cores(a, b, tolerance))?)
+        {
+            let (distance, point) = self.gap(a, b, pose)?;
+            return Ok(Clash { distance, ..clash(ClashClass::Near, point) });
         }
         if self.are_duplicates(a, b, pose, tolerance)? {
             let [lo, hi] = bounds(&PlacedShape::from(a));
-            return Ok(clash(ClashClass::Duplicated, [0, 1, 2].map(|k| lo[k] + (hi[k] - lo[k]) / 2.0)));
+            return Ok(clash(ClashClass::Duplicated, middle(lo, hi)));
         }
         let (own, other) = (PlacedShape::from(a), b.at(pose));
         if matches!(relation, Relation::AInB | Relation::BInA) {
             let (inner, outer) = if relation == Relation::AInB { (&own, &other) } else { (&other, &own) };
             return Ok(clash(ClashClass::Contained, self.first_inside(inner, outer)?.unwrap_or_default()));
         }
-        match check_closed(a, b) {
-            Err(QueryError::NotClosed(_)) => {
-                return Ok(clash(ClashClass::Intersecting, self.common_contact(a, b, pose)?));
-            }
-            is_closed => is_closed?,
+        let has_depth = match check_closed(a, b) {
+            Err(QueryError::NotClosed(_)) => false,
+            is_closed => is_closed.map(|()| true)?,
+        };
+        if is_disjoint {
+            let (distance, point) = self.gap(a, b, pose)?;
+            let depth = has_depth.then_some(Penetration { point, ..Penetration::APART });
+            return Ok(Clash { distance, depth, ..clash(ClashClass::Touching, point) });
+        }
+        if !has_depth {
+            return Ok(clash(ClashClass::Intersecting, self.common_contact(a, b, pose)?));
         }
         let search = PenetrationOptions::new().relative_gap(options.relative_gap);
         let visits = self.memory.budget;
@@ -202,34 +233,17 @@ impl Querier {
         Ok(Clash { depth: Some(depth), ..clash(class, point) })
     }
 
-    /// Tells near parts from parts that are apart.
-    fn near_or_apart(
-        &mut self,
-        a: Shape<'_>,
-        b: Shape<'_>,
-        pose: &Pose,
-        (clearance, relation): (f64, Relation),
-    ) -> Result<Clash, QueryError> {
-        let apart = Clash {
-            class: ClashClass::Apart,
-            relation,
-            distance: f64::INFINITY,
-            depth: None,
-            point: [0.0; 3],
-        };
-        if clearance == 0.0 || !self.cores_within(a, b, pose, limit_of_cores(a, b, clearance))? {
-            return Ok(apart);
-        }
+    /// Returns how far apart the surfaces of two shapes are that have no common point, and the point in the middle of the gap.
+    fn gap(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Result<(f64, [f64; 3]), QueryError> {
         let nearest = self.distance_of_cores(a, b, pose)?;
         let Distance { distance, point_a, point_b, .. } = self.distance_of_shapes(a, b, pose, nearest)?;
-        let point = [0, 1, 2].map(|k| point_a[k] + (point_b[k] - point_a[k]) / 2.0);
-        Ok(Clash { class: ClashClass::Near, distance, point, ..apart })
+        Ok((distance, middle(point_a, point_b)))
     }
 
     /// Returns a point near the contact of two shapes that touch.
     fn common_contact(&mut self, a: Shape<'_>, b: Shape<'_>, pose: &Pose) -> Result<[f64; 3], QueryError> {
         let Distance { point_a, point_b, .. } = self.distance_of_cores(a, b, pose)?;
-        Ok([0, 1, 2].map(|k| point_a[k] + (point_b[k] - point_a[k]) / 2.0))
+        Ok(middle(point_a, point_b))
     }
 
     /// Returns whether two shapes are the same part in the same place: they have as many triangles and the same box, and each
@@ -280,4 +294,9 @@ impl Querier {
         }
         Ok(are_within)
     }
+}
+
+/// Returns the point in the middle between two others.
+fn middle(from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| from[k] + (to[k] - from[k]) / 2.0)
 }

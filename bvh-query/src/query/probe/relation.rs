@@ -58,6 +58,16 @@ impl Querier {
         if self.cores_within(a, b, pose, sum_of_radii(a, b))? {
             return Ok(Relation::Touching);
         }
+        self.relation_of_disjoint(a, b, pose)
+    }
+
+    /// Returns the relation of two shapes that do not touch.
+    pub(crate) fn relation_of_disjoint(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+    ) -> Result<Relation, QueryError> {
         let (own, placed) = (PlacedShape::from(a), b.at(pose));
         let may_contain = |of_a: usize, of_b: usize| {
             let (object_a, object_b) = (&a.objects()[of_a], &b.objects()[of_b]);
