@@ -69,7 +69,7 @@ impl<'a> Found<'a> {
             relation: clash.relation,
             distance: has_distance.then_some(clash.distance),
             depth: clash.depth.map(|depth| [depth.lower, depth.upper]),
-            translation: clash.depth.map(|depth| turn(depth.translation)),
+            translation: clash.depth.filter(|_| clash.distance == 0.0).map(|depth| turn(depth.translation)),
             point: world.place(clash.point),
             status: None,
         }
@@ -164,8 +164,8 @@ impl<'a> Found<'a> {
                 "the first in the second".to_owned()
             }
             (ClashClass::Contained, ..) => "the second in the first".to_owned(),
+            (_, _, Some(distance)) if distance > 0.0 => format!("{} apart", short(distance)),
             (_, Some([lower, upper]), _) => format!("{} to {} deep", short(lower), short(upper)),
-            (ClashClass::Near, _, Some(distance)) => format!("{} apart", short(distance)),
             _ => String::new(),
         }
     }

@@ -42,19 +42,24 @@ Each pair that is not apart is a clash of one class:
   intersecting  they have points in common, and one is not closed, so that they have no depth
   duplicated    they are the same part in the same place, to within the tolerance
   contained     one is wholly inside the other
-  near          they are at most the clearance apart
-  touching      they have points in common, and are no deeper in each other than the tolerance
+  near          they are at most the clearance apart, but farther than the tolerance
+  touching      they are no farther apart and no deeper in each other than the tolerance
 
 The list has them in this order, deep ones and near ones first. The depth is the length of the shortest move of the second part \
 after which they do not overlap; it is certainly between the two bounds. --visits limits the search for it, for each pair. \
 Lengths are in mesh units, which are metres for glTF and COLLADA files.
+
+The tolerance counts from both sides, because flush parts seldom have a face in common to the last bit. A pose that turns by anything \
+but right angles rounds each vertex that it places, by about 1e-16 of its coordinates. A file that has few digits rounds them by half \
+of the last one. Flush parts then overlap or come apart by as much. Whether placed parts are within the tolerance is decided \
+exactly, which takes about as long as whether they touch. With a tolerance of 0, only parts with a common point touch.
 
 A part that is the same as an earlier one, with the same bits of its pose, is reported once, as a duplicate of that one. It is \
 not asked about other parts, because they clash with the earlier one in the same way.
 
 --json prints one object: inputs, units, clearance, tolerance, parts, copies (those that are not asked about others), triangles, \
 seconds, classes (the number of clashes of each), and clashes. A clash has id, class, a, b, relation (as cbvh query numbers it), \
-distance, lower and upper (the bounds of the depth), translation (what moves b out of a) and point, both in the world. What \
+distance, lower and upper (the bounds of the depth, 0 for parts that touch across a gap), translation (what moves b out of a) and point, both in the world. What \
 there is not is null. --csv writes the same rows; a name that a spreadsheet could take for a formula, or that begins with an \
 apostrophe, has an apostrophe before it. The id is a hash of both names, and stays the same while they do.
 
@@ -89,21 +94,22 @@ pub(crate) struct ClashArguments {
     /// Also find parts that are at most this far apart, in mesh units
     #[arg(long, value_name = "D", default_value_t = 0.0, value_parser = not_negative, allow_negative_numbers = true)]
     clearance: f64,
-    /// How deep parts may be in each other and count as touching, in mesh units [default: a millionth of the assembly's diagonal]
+    /// How far apart or how deep in each other parts may be and count as touching, in mesh units [default: a millionth of the
+    /// assembly's diagonal]
     #[arg(long, value_name = "T", value_parser = not_negative, allow_negative_numbers = true)]
     tolerance: Option<f64>,
     /// The most visits of the search for the depth of a pair
     #[arg(long, value_name = "N", default_value_t = ClashOptions::default().visits, value_parser = whole::<u64>, allow_negative_numbers = true)]
     visits: u64,
+    /// Coordinates of meshes: none, or f32, which rounds each to the nearest f32 number on purpose, so that equal ones stay equal
+    #[arg(long, value_name = "R", default_value = "none", value_parser = rounding)]
+    round: Rounding,
     /// Make each object of a mesh file a part
     #[arg(long)]
     split_objects: bool,
     /// Compare with what --json printed earlier
     #[arg(long, value_name = "OLD.json", conflicts_with = "shard")]
     baseline: Option<PathBuf>,
-    /// Coordinates of meshes: none, or f32, which rounds each to the nearest f32 number on purpose, so that equal ones stay equal
-    #[arg(long, value_name = "R", default_value = "none", value_parser = rounding)]
-    round: Rounding,
     /// Exit with code 5 if there is a clash of these classes, separated by commas; with --baseline, a new or changed one
     #[arg(long, value_name = "CLASS", value_delimiter = ',', value_parser = class)]
     fail_on: Vec<ClashClass>,

@@ -323,10 +323,10 @@ export class SceneView implements Tint {
         const shown = this.#clashes.filter((clash) => this.#filter.value === "" || clash.class === this.#filter.value);
         const rows = shown.slice(0, MAX_LISTED_CLASHES).map((clash) => {
             const depth =
-                clash.upper !== undefined
-                    ? `depth ${short(clash.lower ?? 0)} to ${short(clash.upper)}`
-                    : clash.distance !== undefined && clash.distance > 0
-                      ? `${short(clash.distance)} apart`
+                clash.distance !== undefined && clash.distance > 0
+                    ? `${short(clash.distance)} apart`
+                    : clash.upper !== undefined
+                      ? `depth ${short(clash.lower ?? 0)} to ${short(clash.upper)}`
                       : "";
             const detail = h(
                 "span",
