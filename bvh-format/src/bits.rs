@@ -23,6 +23,23 @@ pub(crate) fn load_bits(bytes: &[u8], at: usize) -> u64 {
     word >> (at % 8)
 }
 
+/// Reads at least 121 bits from bit `at` on. Bits beyond the end read as zero.
+#[inline(always)]
+pub(crate) fn load_wide(bytes: &[u8], at: usize) -> u128 {
+    let bytes = bytes.get(at / 8..).unwrap_or(&[]);
+    let word = match bytes.first_chunk() {
+        Some(chunk) => u128::from_le_bytes(*chunk),
+        None => read_wide_tail(bytes),
+    };
+    word >> (at % 8)
+}
+
+/// Reads the last bytes of an array, fewer than sixteen, as a number.
+#[cold]
+fn read_wide_tail(bytes: &[u8]) -> u128 {
+    bytes.iter().rev().fold(0, |word, &byte| word << 8 | u128::from(byte))
+}
+
 /// Reads the last bytes of an array, fewer than eight, as a number.
 #[cold]
 fn read_tail(bytes: &[u8], start: usize) -> u64 {

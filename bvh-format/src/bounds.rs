@@ -27,7 +27,7 @@ pub struct Bound<'a> {
     pub decoded: Kdop,
     /// The turning slab that a query decodes, if the child has one.
     pub turning: Option<TurningSlab>,
-    /// The tightest bound of the triangles below.
+    /// The tightest bound of the triangles below, whose vertices are as near to their offsets as the object states.
     pub tight: &'a Kdop,
     /// The anchor of the subtree root that the child leads to; for other children [`Kdop::EMPTY`].
     pub anchor: &'a Kdop,
@@ -144,6 +144,7 @@ pub fn visit_bounds<'b>(
 ) -> Result<Vec<Subtree>, FormatError> {
     let (header, profile) = (page.header(), object.profile);
     let slabs = profile.directions().slabs();
+    let (are_sums, margins) = (object.vertices.are_sums(), object.vertices.margins());
     let treelets = usize::from(header.treelets);
     let mut packets = vec![Packet::default(); usize::from(header.packets.get())];
     for (number, triangles) in packets_of(page) {
@@ -160,7 +161,10 @@ pub fn visit_bounds<'b>(
             let kdop = match links.child(child) {
                 Child::Treelet(slot) => tight[usize::from(slot)],
                 Child::Remote(link) => below(page.remote(link)).kdop,
-                Child::Leaf { packet, .. } => packets[usize::from(packet)].kdop(PACKET, slabs),
+                Child::Leaf { packet, .. } => {
+                    let kdop = packets[usize::from(packet)].kdop(PACKET, slabs);
+                    if are_sums { kdop } else { kdop.widened(&margins) }
+                }
                 Child::Empty => continue,
             };
             children[slot * width + child] = kdop;
@@ -223,7 +227,7 @@ pub fn check_bounds<'b>(
 ) -> Result<(Vec<Subtree>, Inflation), FormatError> {
     let slabs = object.profile.directions().slabs();
     let at = layout.page_offset(page.header().page_number.get());
-    let mut inflation = Inflation::default();
+    let (mut inflation, margins) = (Inflation::default(), object.vertices.margins());
     let subtrees = visit_bounds(object, page, leaf_block, below, |bound| {
         let Bound { slot, child, decoded, turning, tight, anchor, patch } = bound;
         let place =
@@ -246,12 +250,12 @@ pub fn check_bounds<'b>(
                 let expected = format!("at most {MAX_TRIANGLES} triangles below {}", place());
                 FormatError::new(Rule::TurningTriangles, at, expected, "more")
             })?;
-            ensure(slab.contains(patch), Rule::BoundContains, at, || {
+            ensure(slab.contains(patch, object.vertices.left_out), Rule::BoundContains, at, || {
                 (format!("the turning slab of {} to contain its triangles", place()), format!("{slab:?}"))
             })?;
         }
         if child.is_some() {
-            inflation.add(&decoded, tight, slabs);
+            inflation.add(&decoded, tight, slabs, &margins);
         }
         Ok(())
     })?;
@@ -282,12 +286,15 @@ pub struct Inflation {
 }
 
 impl Inflation {
-    /// Adds a node. A point, which is flat in every direction, has no ratio and is not counted.
-    pub fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize) {
+    /// Adds a node, whose tight slabs were widened by margins. What is flat in a direction has no ratio there, and a point,
+    /// which is flat in every direction, is not counted.
+    pub fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize, margins: &[f64; 13]) {
         let ratio = |slab: usize| {
-            let tight = f64::from(tight.hi[slab]) - f64::from(tight.lo[slab]);
-            let held = f64::from(held.hi[slab]) - f64::from(held.lo[slab]);
-            (tight > 0.0).then_some(held / tight)
+            let [lo, hi] = [tight.lo[slab], tight.hi[slab]].map(f64::from);
+            let (width, held) = (hi - lo, f64::from(held.hi[slab]) - f64::from(held.lo[slab]));
+            // Both ends of what is flat are as far out as the margin, and were rounded by less than 2^-23 of themselves each.
+            let rounding = if margins[slab] > 0.0 { 2f64.powi(-22) * lo.abs().max(hi.abs()) } else { 0.0 };
+            (width > 2.0 * margins[slab] + rounding).then_some(held / width)
         };
         let (sum, count) =
             (0..slabs).filter_map(ratio).fold((0.0, 0), |(sum, n), ratio| (sum + ratio, n + 1));

@@ -14,7 +14,7 @@ pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
 /// The major version. 0 stands for the release candidates of version 1.0.
 pub const MAJOR: u16 = 0;
 /// The minor version: the number of the release candidate. Readers refuse any other version.
-pub const MINOR: u16 = 2;
+pub const MINOR: u16 = 3;
 /// The most entries that the section table can have.
 pub const MAX_SECTIONS: usize = 64;
 /// The most bytes that the header and the section table can take together.
@@ -25,7 +25,7 @@ pub const fn head_bytes(sections: usize) -> usize {
     size_of::<Header>() + sections * size_of::<SectionEntry>()
 }
 
-/// Returns the name of a version that a header states as a major and a minor number: `1.0-rc2` for 0 and 2.
+/// Returns the name of a version that a header states as a major and a minor number: `1.0-rc3` for 0 and 3.
 pub fn version_name((major, minor): (u16, u16)) -> String {
     if major == 0 { format!("1.0-rc{minor}") } else { format!("{major}.{minor}") }
 }

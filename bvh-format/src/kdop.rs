@@ -244,7 +244,7 @@ pub(crate) fn round_down(value: f64) -> f32 {
     from_ordered(to_ordered(nearest) - i32::from(f64::from(nearest) > value))
 }
 
-/// Returns the nearest `f64` at or below, and at or above, the exact sum of three `f32` numbers.
+/// Returns the nearest `f64` at or below, and at or above, the exact sum of three numbers.
 pub(crate) fn sum_of_three(a: f64, b: f64, c: f64) -> (f64, f64) {
     let (sum_ab, error_ab) = two_sum(a, b);
     let (sum, error_c) = two_sum(sum_ab, c);

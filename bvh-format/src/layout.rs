@@ -6,11 +6,11 @@ use crate::error::{FormatError, ensure, require};
 use crate::header::{Header, MAX_HEAD_BYTES, Section, SectionKind, read_header};
 use crate::ids::{WORD, id_block_bytes};
 use crate::instances::{Instance, read_instances};
-use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding};
+use crate::leaf::{F32_PACKET_BYTES, LINE, PackedHead, TriangleEncoding, corrections_of};
 use crate::object::{Object, read_objects};
 use crate::page::{MAX_PAGES, PAGE, Page, PageHeader};
 use crate::rule::Rule;
-use crate::source::{Block, PageBytes, Source, chunks};
+use crate::source::{Block, MAX_BLOCK_BYTES, PageBytes, Source, chunks};
 use crate::topology::{ObjectTopology, check_lists, read_records};
 use std::ops::Range;
 use zerocopy::FromBytes;
@@ -275,7 +275,7 @@ impl Layout {
     /// Does the same as [`Layout::check_leaf_block`] for a block that has been read.
     ///
     /// # Errors
-    /// Rules 26 to 28.
+    /// Rules 26 to 28 and 52.
     pub fn check_leaf_block_of(
         &self,
         block: &Block,
@@ -297,7 +297,14 @@ impl Layout {
                 )
             })
         };
-        if object.triangle_encoding == TriangleEncoding::F32 {
+        let is_corrected = object.vertices().are_corrected() && packets > 0;
+        if is_corrected {
+            let holds = block.length() / LINE == lines && block.length() <= MAX_BLOCK_BYTES;
+            ensure(holds, Rule::LeafPlace, at + 24, || {
+                let expected = format!("a block of at most {MAX_BLOCK_BYTES} bytes in whole lines");
+                (expected, format!("{} bytes, stated as {lines} lines", block.length()))
+            })?;
+        } else if object.triangle_encoding == TriangleEncoding::F32 {
             there(packets * F32_PACKET_BYTES)?;
         }
         let sum = header.leaf_checksum.get();
@@ -308,7 +315,28 @@ impl Layout {
                 let found = format!("{:?}", PackedHead::read(block.bytes()));
                 FormatError::new(Rule::PackedHeader, at + 24, "a consistent head", found)
             })?;
-            there(head.block_bytes())?;
+            if !is_corrected {
+                there(head.block_bytes())?;
+            }
+        }
+        if is_corrected {
+            let corrections = corrections_of(object.triangle_encoding, block.bytes(), packets);
+            let (head, bytes, corners) = corrections.ok_or_else(|| {
+                let found = format!("{} bytes", block.length());
+                FormatError::new(Rule::LeafPlace, at + 24, "a block with the head of its corrections", found)
+            })?;
+            ensure(
+                head.is_consistent(corners, object.vertices().corrected),
+                Rule::Corrections,
+                at + 24,
+                || {
+                    (
+                        format!("corrections of at most {corners} corners, of at most 64 bits each"),
+                        format!("{head:?}"),
+                    )
+                },
+            )?;
+            there((block.length() - bytes.len()).saturating_add(head.bytes(corners)))?;
         }
         Ok(())
     }

@@ -81,6 +81,7 @@ pub mod topology;
 pub mod treelet;
 pub mod turning;
 pub mod validate;
+pub mod vertex;
 
 pub use error::FormatError;
 pub use layout::Layout;

@@ -7,6 +7,7 @@ use crate::kdop::two_sum;
 use crate::leaf::{PACKET, Packet, TriangleEncoding};
 use crate::profile::Profile;
 use crate::rule::Rule;
+use crate::vertex::{Predictor, Vertices, is_multiple_of_least};
 use zerocopy::byteorder::little_endian::{F32, F64, I32, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
@@ -27,9 +28,9 @@ pub struct ObjectRecord {
     pub name_offset: U32,
     /// Bytes of the name.
     pub name_length: U32,
-    /// The origin: a vertex of the mesh is `origin + v`, which is exact in f64.
+    /// The origin, around which offsets are.
     pub origin: [F64; 3],
-    /// Lower corner of the axis-aligned box of all v.
+    /// Lower corner of an axis-aligned box of all vertices, around the origin.
     pub box_lo: [F32; 3],
     /// Upper corner of that box.
     pub box_hi: [F32; 3],
@@ -43,7 +44,7 @@ pub struct ObjectRecord {
     pub first_page: U32,
     /// Pages of the object.
     pub pages: U32,
-    /// The largest distance by which rounding to `origin + f32` moved a vertex.
+    /// The largest distance by which a vertex moved before it was quantised.
     pub max_vertex_rounding: F64,
     /// The largest further distance by which `quantized` moved a vertex; 0 for other encodings.
     pub max_quantization_error: F64,
@@ -61,7 +62,7 @@ pub struct ObjectRecord {
     pub triangle_encoding: u8,
     /// Zero.
     pub reserved: [u8; 2],
-    /// Centre of a sphere that contains all v.
+    /// Centre of a sphere that contains all vertices, around the origin.
     pub sphere_centre: [F32; 3],
     /// The radius of that sphere, rounded up.
     pub sphere_radius: F32,
@@ -69,8 +70,20 @@ pub struct ObjectRecord {
     pub radius: F64,
     /// 1 if what is inside the object touches it, else 0. The same for all objects.
     pub solid: u8,
+    /// How the coordinates of each axis follow from offsets: the number of a `Predictor`.
+    pub predictors: [u8; 3],
+    /// The digits of each predictor.
+    pub digits: [u8; 3],
+    /// Bit a is set if leaf blocks correct coordinates of axis a.
+    pub corrected: u8,
+    /// For each axis, the largest distance of a coordinate from the sum of the origin and its offset, rounded up.
+    pub left_out: [F32; 3],
+    /// The scale of `Predictor::Scaled`; 0 without it.
+    pub scale: F64,
+    /// 1 if the object is known to be convex, else 0.
+    pub convex: u8,
     /// Zero.
-    pub reserved_end: [u8; 31],
+    pub reserved_end: [u8; 3],
 }
 
 const _: () = assert!(size_of::<ObjectRecord>() == 192);
@@ -82,6 +95,7 @@ pub struct Object {
     pub(crate) profile: Profile,
     pub(crate) triangle_encoding: TriangleEncoding,
     pub(crate) f16_scale: f32,
+    pub(crate) vertices: Vertices,
     pub(crate) volumes: Volumes,
     pub(crate) record: ObjectRecord,
 }
@@ -103,10 +117,12 @@ pub struct Volumes {
     /// The sum, over the axes, of the magnitude of the origin and three times the magnitudes of both ends of the box. It bounds
     /// the numbers that are added up when a vertex is placed.
     pub magnitude: f64,
+    /// How far a vertex may be from the sum of the origin and its offsets: a bound of the Euclidean distance.
+    pub left_out: f64,
 }
 
 impl Volumes {
-    pub(crate) fn of(record: &ObjectRecord) -> Self {
+    pub(crate) fn of(record: &ObjectRecord, vertices: &Vertices) -> Self {
         let [lo, hi] = [record.box_lo, record.box_hi].map(|corner| corner.map(|v| f64::from(v.get())));
         let origin = record.origin.map(|v| v.get());
         let magnitude = |axis: usize| origin[axis].abs() + 3.0 * (lo[axis].abs() + hi[axis].abs());
@@ -117,6 +133,8 @@ impl Volumes {
             sphere_centre: record.sphere_centre.map(|v| f64::from(v.get())),
             sphere_radius: record.sphere_radius.get().into(),
             magnitude: magnitude(0) + magnitude(1) + magnitude(2),
+            // At least as long as the root of the sum of squares.
+            left_out: vertices.left_out.iter().map(|&most| f64::from(most)).sum(),
         }
     }
 }
@@ -132,11 +150,16 @@ impl Object {
         self.record.triangles.get()
     }
 
-    /// The origin in mesh units. Coordinates in the file are `f32` numbers around it, and `origin + v` is exact in
-    /// `f64` for every stored vertex.
+    /// The origin in mesh units. Offsets in the file are `f32` numbers around it.
     #[inline]
     pub fn origin(&self) -> [f64; 3] {
         self.volumes.origin
+    }
+
+    /// How vertices follow from offsets.
+    #[inline]
+    pub fn vertices(&self) -> &Vertices {
+        &self.vertices
     }
 
     /// The bounding volumes in `f64`.
@@ -145,8 +168,8 @@ impl Object {
         &self.volumes
     }
 
-    /// The lower and the upper corner of the axis-aligned box of all stored vertices, in mesh units. The box is exact.
-    /// It is flat along an axis on which all vertices have the same coordinate.
+    /// The lower and the upper corner of an axis-aligned box that contains all vertices, in mesh units. It is exact where each
+    /// coordinate is the sum of the origin and an `f32`, and else wider by what `f32` leaves out.
     pub fn bounding_box(&self) -> [[f64; 3]; 2] {
         let origin = self.origin();
         let corner = |v: [F32; 3]| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis].get()));
@@ -173,15 +196,27 @@ impl Object {
     pub fn sphere_contains<'a>(&self, packets: impl IntoIterator<Item = &'a Packet>) -> bool {
         let [a, b, c] = self.record.sphere_centre.map(|c| f64::from(c.get()));
         let radius = f64::from(self.record.sphere_radius.get());
+        let [p, q, r] = self.vertices.left_out.map(f64::from);
         // All lanes at once, which compilers turn into vector code.
         packets.into_iter().flat_map(|packet| &packet.corners).all(|[x, y, z]| {
             let mut inside = true;
             for lane in 0..PACKET {
                 let (x, y, z) = (f64::from(x[lane]) - a, f64::from(y[lane]) - b, f64::from(z[lane]) - c);
+                let (x, y, z) = (x.abs() + p, y.abs() + q, z.abs() + r);
                 inside &= x * x + y * y + z * z <= radius * radius;
             }
             inside
         })
+    }
+
+    /// How far a vertex may be from the one that was given to the baker, in mesh units: 0 unless vertices were quantised, rounded
+    /// or welded on purpose, or lay below the least unit of the format.
+    pub fn max_move(&self) -> f64 {
+        let [rounding, quantization] =
+            [self.record.max_vertex_rounding.get(), self.record.max_quantization_error.get()];
+        let sum = rounding + quantization;
+        // Rounded up.
+        if rounding > 0.0 && quantization > 0.0 { sum.next_up() } else { sum }
     }
 
     /// The radius in mesh units: the object stands for all points this near to its triangles.
@@ -312,24 +347,48 @@ fn read_object(
     let triangle_encoding = TriangleEncoding::from_number(record.triangle_encoding)
         .ok_or_else(|| unknown(at + 133, "a triangle encoding from 0 to 2", record.triangle_encoding))?;
     let f16_scale = f32::from_bits(((record.f16_exponent.get() + 127) as u32) << 23);
-    let volumes = Volumes::of(record);
-    Ok(Object { name: name.to_owned(), profile, triangle_encoding, f16_scale, volumes, record: *record })
+    let vertices = read_vertices(record).ok_or_else(|| {
+        let expected = "predictors of vertices that fit the origin and the scale";
+        FormatError::new(Rule::ObjectNumbers, at + 161, expected, format!("{record:?}"))
+    })?;
+    let volumes = Volumes::of(record, &vertices);
+    let name = name.to_owned();
+    Ok(Object { name, profile, triangle_encoding, f16_scale, vertices, volumes, record: *record })
 }
 
-/// Returns true for multiples of 2^-149, the smallest positive f32.
-fn is_multiple_of_smallest(value: f64) -> bool {
-    // The product is at most 2^269, and exact.
-    (value * 2f64.powi(149)).fract() == 0.0
+/// Reads what a record states about vertices, or returns `None` if it breaks rule 12.
+fn read_vertices(record: &ObjectRecord) -> Option<Vertices> {
+    let mut vertices = Vertices::around(record.origin.map(F64::get));
+    for axis in 0..3 {
+        let predictor = Predictor::from_parts(record.predictors[axis], record.digits[axis])?;
+        let left_out = record.left_out[axis].get();
+        let is_corrected = record.corrected >> axis & 1 == 1;
+        let is_sum = predictor == Predictor::Sum && !is_corrected;
+        if predictor.needs_no_origin() && vertices.origin[axis] != 0.0
+            || !(0.0..=MAX_COORDINATE as f32).contains(&left_out)
+            || is_sum && left_out != 0.0
+        {
+            return None;
+        }
+        vertices.predictors[axis] = predictor;
+        vertices.corrected[axis] = is_corrected;
+        vertices.left_out[axis] = left_out;
+    }
+    vertices.scale = record.scale.get();
+    let is_scaled = vertices.predictors.contains(&Predictor::Scaled);
+    let has_scale = if is_scaled { vertices.scale.abs().is_normal() } else { vertices.scale == 0.0 };
+    (has_scale && record.corrected < 8 && record.convex <= 1).then_some(vertices)
 }
 
 /// Checks rule 12 for a record. All have the radius and the solidity of the first one.
 fn check_numbers(record: &ObjectRecord, first: &ObjectRecord, at: u64) -> Result<(), FormatError> {
     let limit = MAX_COORDINATE;
     let coordinate = |v: f64| v.abs() <= limit;
-    let origin = record.origin.iter().all(|v| coordinate(v.get()) && is_multiple_of_smallest(v.get()));
+    let origin = record.origin.iter().all(|v| coordinate(v.get()) && is_multiple_of_least(v.get()));
     let boxed = (0..3).all(|a| {
         let (lo, hi) = (f64::from(record.box_lo[a].get()), f64::from(record.box_hi[a].get()));
-        coordinate(lo) && coordinate(hi) && lo <= hi
+        // Beyond the offsets by what these leave out.
+        lo >= -2.0 * limit && hi <= 2.0 * limit && lo <= hi
     });
     let errors = [record.max_vertex_rounding, record.max_quantization_error];
     let errors = errors.iter().all(|v| v.get() >= 0.0 && v.get() <= limit);
@@ -388,15 +447,16 @@ mod tests {
         record.sphere_radius = 4.0.into();
         let (profile, triangle_encoding) = (Profile::Dop14U8, TriangleEncoding::F32);
         let object = |record| {
-            let volumes = Volumes::of(&record);
-            Object { name: "a".to_owned(), profile, triangle_encoding, f16_scale: 1.0, volumes, record }
+            let vertices = read_vertices(&record).unwrap();
+            let (name, volumes) = ("a".to_owned(), Volumes::of(&record, &vertices));
+            Object { name, profile, triangle_encoding, f16_scale: 1.0, vertices, volumes, record }
         };
         let exact = object(record);
-        let Volumes { origin, box_centre, half_sides, sphere_centre, sphere_radius, magnitude } =
+        let Volumes { origin, box_centre, half_sides, sphere_centre, sphere_radius, magnitude, left_out } =
             exact.volumes;
         assert_eq!([origin, box_centre, half_sides], [[1e6, -0.5, 0.0], [0.0; 3], [1.0, 2.0, 3.0]]);
         assert_eq!((sphere_centre, sphere_radius), ([0.25, 0.5, -0.25], 4.0));
-        assert_eq!(magnitude, 1e6 + 0.5 + 3.0 * 12.0);
+        assert_eq!((magnitude, left_out), (1e6 + 0.5 + 3.0 * 12.0, 0.0));
         assert_eq!(exact.bounding_box(), [[999_999.0, -2.5, -3.0], [1_000_001.0, 1.5, 3.0]]);
         assert_eq!(exact.bounding_sphere(), ([1_000_000.25, 0.0, -0.25], 4.0));
         // The last bits of the centre do not fit beside the origin: the radius makes up for them.
@@ -407,11 +467,11 @@ mod tests {
     }
 
     #[test]
-    fn origins_are_multiples_of_the_smallest_f32() {
+    fn origins_are_multiples_of_the_least_unit() {
         let mut record = ObjectRecord::new_zeroed();
         record.triangles = 1.into();
         record.packets = 1.into();
-        let smallest = 2f64.powi(-149);
+        let smallest = 2f64.powi(-180);
         for (origin, holds) in [
             (0.0, true),
             (-smallest, true),
@@ -419,7 +479,7 @@ mod tests {
             (-(2f64.powi(120)), true),
             (smallest / 2.0, false),
             (smallest * 1.5, false),
-            (2f64.powi(-149 + 51) + smallest / 2.0, false),
+            (2f64.powi(-180 + 51) + smallest / 2.0, false),
             (2f64.powi(-1074), false),
             (2f64.powi(121), false),
             (f64::NAN, false),

@@ -52,14 +52,14 @@ rules! {
     LeafChecksum = 27, "a leaf block has the checksum that its page states";
     PackedHeader = 28, "a packed leaf block's bit widths are within the limits and its parts within the block";
     PackedRecord = 29, "a packed packet's slots are those of vertices in the block's pool";
-    VertexFinite = 30, "a vertex coordinate is finite and at most 2^120 in magnitude";
+    VertexFinite = 30, "the offset of a coordinate is finite and at most 2^120 in magnitude";
     IdPlace = 31, "an id block lies within the id section and has the size its packets need";
     IdChecksum = 32, "an id block has the checksum that its page states";
     IdRange = 33, "a triangle id is below the number of triangles of the input";
     Counts = 34, "an object's counts of treelets, packets and triangles are those of its pages";
     BoundContains = 35, "every decoded slab contains the triangles below it";
     DuplicateIds = 36, "duplicate ids come in ascending pairs (kept, dropped)";
-    VertexOnGrid = 37, "the origin plus a vertex is exact in 64-bit floating point";
+    VertexPlace = 37, "a coordinate is as near to its offset as its object states";
     Codes = 38, "codes that are floats are finite, and f16 codes not negative";
     TurningTriangles = 39, "a child with a turning slab has at most 1024 triangles below";
     InstanceTable = 40, "the instances section has one record of 128 bytes per instance and names within its bytes";
@@ -74,6 +74,7 @@ rules! {
     Nested = 49, "the slabs of a node lie within those of its parent";
     InstanceMargin = 50, "an instance's margin is within the limits, and it is solid or not";
     SolidClosed = 51, "what is solid is closed";
+    Corrections = 52, "corrections of a leaf block are of its corners, in order, and on axes that have them";
 }
 
 impl Rule {

@@ -230,40 +230,39 @@ fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable, E: Fro
 }
 
 /// Returns the boundary of a triangle as one number. For each edge it adds the checksum of the edge, or subtracts it if
-/// the triangle goes along the edge from its greater end to its lesser one. An edge between equal ends adds nothing.
+/// the triangle goes along the edge from its greater end to its lesser one. An edge between equal ends adds nothing. The ends
+/// are the bits of the coordinates, of vertices or of offsets that determine them, none of which is -0.
 ///
 /// The sum over triangles without a boundary is 0, since each edge is added as often as it is subtracted. The sum over
 /// others is 0 with a probability of about 2^-64. All sums wrap around.
-pub fn boundary(corners: &[[f32; 3]; 3]) -> u64 {
-    let ends = corners.map(end_of_edge);
+pub fn boundary<T: Copy + Into<u64> + IntoBytes + Immutable>(ends: &[[T; 3]; 3]) -> u64 {
+    // Two numbers for each end, which are compared faster than three.
+    let keys = ends.map(|[x, y, z]| (u128::from(x.into()) << 64 | u128::from(y.into()), z.into()));
     let mut sum = 0u64;
     for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-        let [from, to]: [u128; 2] = [ends[from], ends[to]];
-        if from < to {
-            sum = sum.wrapping_add(edge_checksum(from, to));
-        } else if to < from {
-            sum = sum.wrapping_sub(edge_checksum(to, from));
+        if keys[from] < keys[to] {
+            sum = sum.wrapping_add(edge_checksum(&ends[from], &ends[to]));
+        } else if keys[to] < keys[from] {
+            sum = sum.wrapping_sub(edge_checksum(&ends[to], &ends[from]));
         }
     }
     sum
 }
 
-/// Returns the bits of a point as one number: those of x, y and z from the most significant to the least. Both zeros are
-/// the same.
-fn end_of_edge(point: [f32; 3]) -> u128 {
+/// Returns the boundary of a triangle, given its offsets, and its vertices if offsets do not determine these.
+pub fn boundary_of(offsets: &[[f32; 3]; 3], vertices: Option<&[[f64; 3]; 3]>) -> u64 {
     // -0.0 + 0.0 is 0.0; every other number stays as it is.
-    let [x, y, z] = point.map(|value| u128::from((value + 0.0).to_bits()));
-    x << 64 | y << 32 | z
+    match vertices {
+        None => boundary(&offsets.map(|corner| corner.map(|value| (value + 0.0).to_bits()))),
+        Some(vertices) => boundary(&vertices.map(|corner| corner.map(|value| (value + 0.0).to_bits()))),
+    }
 }
 
-/// Returns the checksum of the 24 bytes of an edge: x, y and z of its lesser end, then those of its greater end.
-fn edge_checksum(lesser: u128, greater: u128) -> u64 {
-    let mut bytes = [0; 24];
-    for (at, end) in [(0, lesser), (12, greater)] {
-        for (axis, shift) in [64, 32, 0].into_iter().enumerate() {
-            let value = ((end >> shift) as u32).to_le_bytes();
-            bytes[at + 4 * axis..][..4].copy_from_slice(&value);
-        }
-    }
-    checksum(&bytes)
+/// Returns the checksum of the bytes of an edge: x, y and z of its lesser end, then those of its greater end.
+fn edge_checksum<T: IntoBytes + Immutable>(lesser: &[T; 3], greater: &[T; 3]) -> u64 {
+    let mut bytes = [0; 48];
+    let half = size_of::<[T; 3]>();
+    bytes[..half].copy_from_slice(lesser.as_bytes());
+    bytes[half..2 * half].copy_from_slice(greater.as_bytes());
+    checksum(&bytes[..2 * half])
 }

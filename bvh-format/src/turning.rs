@@ -11,11 +11,12 @@
 //! 256, so that decoding rounds nothing, and it is not normalised. Its coordinates' magnitudes add up to less than 1, so that
 //! projections are no larger than coordinates.
 
-use crate::kdop::{round_down, sum_of_three};
+use crate::kdop::{round_down, sum_of_three, two_sum};
 use crate::leaf::{PACKET, Packet};
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, encode_max_outward, encode_min_outward, residual_unit};
 use crate::slabs::NodeSlabs;
+use crate::vertex::margin_along;
 
 /// The most triangles below a child with a turning slab (R39).
 ///
@@ -74,16 +75,36 @@ pub struct TurningSlab {
 }
 
 impl TurningSlab {
-    /// The slab of the triangles in packets along a direction. Each end is outside the tightest one, by less than 2^-22
-    /// of the largest coordinate. Lanes beyond a packet's triangles count as well, so they must repeat some of these.
-    pub fn around<'a>(direction: TurningDirection, packets: impl IntoIterator<Item = &'a Packet>) -> Self {
+    /// The slab of the triangles in packets along a direction, whose vertices are as near to their offsets as stated. Each end
+    /// is outside the tightest one, by less than 2^-22 of the largest coordinate. Lanes beyond a packet's triangles count as
+    /// well, so they must repeat some of these.
+    pub fn around<'a>(
+        direction: TurningDirection,
+        packets: impl IntoIterator<Item = &'a Packet>,
+        left_out: [f32; 3],
+    ) -> Self {
         let (lo, hi) = reach_of_packets(direction, packets);
+        // A sum that is rounded to nearest is no more than half of this beyond the exact one.
+        let margin = margin(direction, left_out) * (1.0 + 2f64.powi(-50));
+        let (lo, hi) = (lo - margin, hi + margin);
+        let (lo, hi) = if margin > 0.0 { (lo.next_down(), hi.next_up()) } else { (lo, hi) };
         Self { direction, lo: round_down(lo), hi: -round_down(-hi) }
     }
 
-    /// Returns true if the slab contains the triangles of packets, in exact arithmetic.
-    pub fn contains<'a>(&self, packets: impl IntoIterator<Item = &'a Packet> + Clone) -> bool {
-        let (lo, hi) = (f64::from(self.lo), f64::from(self.hi));
+    /// Returns true if the slab contains the triangles of packets, whose vertices are as near to their offsets as stated, in
+    /// exact arithmetic.
+    pub fn contains<'a>(
+        &self,
+        packets: impl IntoIterator<Item = &'a Packet> + Clone,
+        left_out: [f32; 3],
+    ) -> bool {
+        let margin = margin(self.direction, left_out);
+        // Both ends without the margin, rounded inward.
+        let inward = |end: f64| {
+            let (sum, rest) = two_sum(end, margin);
+            if rest > 0.0 { sum.next_up() } else { sum }
+        };
+        let (lo, hi) = (inward(self.lo.into()), -inward(-f64::from(self.hi)));
         let reach = reach_of_packets(self.direction, packets.clone());
         if lo <= reach.0 && reach.1 <= hi {
             return true;
@@ -97,6 +118,11 @@ impl TurningSlab {
             })
         })
     }
+}
+
+/// How much farther vertices may reach along a direction than their offsets do, rounded up.
+fn margin(direction: TurningDirection, left_out: [f32; 3]) -> f64 {
+    margin_along(direction.vector().map(f64::from), left_out)
 }
 
 /// What the triangles in packets reach along a direction, below and above, or somewhat more.
@@ -300,8 +326,8 @@ mod tests {
                 .collect();
             let points = triangles.as_flattened();
             let packet = Packet::new(&triangles);
-            let tight = TurningSlab::around(direction, [&packet]);
-            assert!(contains_exactly(&tight, points) && tight.contains([&packet]));
+            let tight = TurningSlab::around(direction, [&packet], [0.0; 3]);
+            assert!(contains_exactly(&tight, points) && tight.contains([&packet], [0.0; 3]));
             let largest = points.as_flattened().iter().fold(0.0f32, |m, c| m.max(c.abs()));
             let shrunk = |by: f32| TurningSlab { lo: tight.lo + by, hi: tight.hi - by, ..tight };
             assert!(!contains_exactly(&shrunk(largest * 2f32.powi(-21)), points), "{tight:?}");
@@ -313,7 +339,7 @@ mod tests {
                 TurningSlab { hi: f32::NAN, ..tight },
             ] {
                 let expected = !slab.hi.is_nan() && contains_exactly(&slab, points);
-                assert_eq!(slab.contains([&packet]), expected, "{slab:?}");
+                assert_eq!(slab.contains([&packet], [0.0; 3]), expected, "{slab:?}");
             }
             // Through the codes of a treelet, under a parent somewhat larger.
             let kdop = Kdop::of_points(points.iter().copied());

@@ -15,13 +15,14 @@ use crate::header::SectionKind;
 use crate::ids::decode_id;
 use crate::instances::Instance;
 use crate::layout::{ContentHasher, Layout, PairsInOrder};
-use crate::leaf::{PackedHead, Packet, TriangleEncoding, decode_packet};
+use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, VertexBlock, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
 use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source, chunks};
-use crate::topology::{ObjectTopology, boundary, check_in_pages};
+use crate::topology::{ObjectTopology, boundary_of, check_in_pages};
 use crate::treelet::Child;
+use crate::vertex::{NO_FINER, Vertices, is_multiple_of_least};
 use std::ops::Range;
 
 /// The number of pages that workers share, and whose counts are in memory at a time.
@@ -200,7 +201,7 @@ pub struct ValidatedPage<'a> {
     pub leaves: Block<'a>,
     /// How many parts the page has.
     pub counts: Counts,
-    /// The sum of the [boundaries](boundary) of its triangles if the object is closed, else 0.
+    /// The sum of the [boundaries](boundary_of) of its triangles if the object is closed, else 0.
     pub boundary: u64,
 }
 
@@ -208,7 +209,7 @@ pub struct ValidatedPage<'a> {
 /// whether the file states that the object is closed.
 ///
 /// # Errors
-/// The first of rules 15 to 33, 37 and 38 that does not hold, or an error of the source.
+/// The first of rules 15 to 33, 37, 38 and 52 that does not hold, or an error of the source.
 pub fn validate_page<'a, S: Source + ?Sized>(
     layout: &Layout,
     source: &'a S,
@@ -270,7 +271,13 @@ fn check_values(
     ids: &[u8],
 ) -> Result<(u64, u64), FormatError> {
     let at = layout.page_offset(page.header().page_number.get());
-    let origin = object.record.origin.map(|o| o.get());
+    let vertices = &object.vertices;
+    let (are_sums, are_corrected) = (vertices.are_sums(), vertices.are_corrected());
+    let behind =
+        VertexBlock::new(object.triangle_encoding, vertices, block, page.header().packets.get().into());
+    ensure(behind.are_in_order(), Rule::Corrections, at + 24, || {
+        ("lists of ascending numbers of corners".into(), "others".into())
+    })?;
     let (mut triangles, mut sum) = (0, 0u64);
     for (packet, count) in packets(page) {
         triangles += count as u64;
@@ -278,9 +285,20 @@ fn check_values(
             check_record(block, usize::from(packet), at)?;
         }
         let values = decode_packet(object.triangle_encoding, block, usize::from(packet));
-        check_vertices(&values, origin, at)?;
-        for lane in 0..if closed { count } else { 0 } {
-            sum = sum.wrapping_add(boundary(&values.triangle(lane)));
+        check_offsets(&values, vertices, at)?;
+        if !are_sums && !are_corrected {
+            check_predicted(&values, vertices, at)?;
+        }
+        for lane in 0..if are_corrected { PACKET } else { 0 } {
+            let offsets = values.triangle(lane);
+            let corners = behind.behind(packet.into(), lane, offsets);
+            check_vertices(&offsets, &corners, vertices, at)?;
+            if closed && lane < count {
+                sum = sum.wrapping_add(boundary_of(&offsets, Some(&corners)));
+            }
+        }
+        for lane in 0..if closed && !are_corrected { count } else { 0 } {
+            sum = sum.wrapping_add(boundary_of(&values.triangle(lane), None));
         }
         for lane in 0..if ids.is_empty() { 0 } else { count } {
             let id = u64::from(decode_id(ids, usize::from(packet), lane));
@@ -304,8 +322,10 @@ fn check_record(block: &[u8], packet: usize, at: u64) -> Result<(), FormatError>
     })
 }
 
-fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), FormatError> {
+/// Checks the offsets of a packet: their size and, where coordinates are sums of the origin and an offset, that these are exact.
+fn check_offsets(packet: &Packet, vertices: &Vertices, at: u64) -> Result<(), FormatError> {
     // All at once, which compilers turn into vector code. Only what breaks a rule is looked for one by one.
+    let origin = vertices.origin;
     let mut all_keep_the_rules = true;
     for corner in &packet.corners {
         for axis in 0..3 {
@@ -327,10 +347,57 @@ fn check_vertices(packet: &Packet, origin: [f64; 3], at: u64) -> Result<(), Form
                 })?;
                 let sum = origin[axis] + value;
                 let exact = sum - origin[axis] == value && sum - value == origin[axis];
-                ensure(exact, Rule::VertexOnGrid, at + 24, || {
+                let holds = exact || !vertices.is_sum(axis);
+                ensure(holds, Rule::VertexPlace, at + 24, || {
                     (format!("a coordinate whose sum with {} is exact", origin[axis]), value.to_string())
                 })?;
             }
+        }
+    }
+    Ok(())
+}
+
+/// Checks a packet of vertices without corrections, as [`check_vertices`] does.
+fn check_predicted(packet: &Packet, vertices: &Vertices, at: u64) -> Result<(), FormatError> {
+    // All at once, which compilers turn into vector code. Only what breaks a rule is looked for one by one.
+    let mut all_keep_the_rules = true;
+    for corner in &packet.corners {
+        for (axis, offsets) in corner.iter().enumerate() {
+            let (origin, most) = (vertices.origin[axis], f64::from(vertices.left_out[axis]));
+            for (coordinate, offset) in vertices.predicted(axis, offsets).into_iter().zip(offsets) {
+                let sum = origin + f64::from(*offset);
+                let is_exact = (sum - f64::from(*offset) == origin) & (sum - origin == f64::from(*offset));
+                // Rounding keeps the order of a difference and of what it may be.
+                let distance = (coordinate - sum).abs();
+                let is_near = (distance < most) | (distance == 0.0);
+                let has_unit = (coordinate.abs() >= NO_FINER) | (coordinate == 0.0);
+                all_keep_the_rules &= is_exact & is_near & has_unit;
+            }
+        }
+    }
+    for lane in 0..if all_keep_the_rules { 0 } else { PACKET } {
+        let offsets = packet.triangle(lane);
+        check_vertices(&offsets, &vertices.predicted_triangle(&offsets), vertices, at)?;
+    }
+    Ok(())
+}
+
+/// Checks that the coordinates of a triangle are as near to their offsets as the object states, and of its units.
+fn check_vertices(
+    offsets: &[[f32; 3]; 3],
+    corners: &[[f64; 3]; 3],
+    vertices: &Vertices,
+    at: u64,
+) -> Result<(), FormatError> {
+    for (offsets, corner) in offsets.iter().zip(corners) {
+        for axis in 0..3 {
+            let (offset, coordinate) = (offsets[axis], corner[axis]);
+            let holds = vertices.is_within(axis, offset, coordinate) && is_multiple_of_least(coordinate);
+            ensure(holds, Rule::VertexPlace, at + 24, || {
+                let [origin, left_out] = [vertices.origin[axis], vertices.left_out[axis].into()];
+                let expected = format!("a multiple of 2^-180 within {left_out} of {origin} + {offset}");
+                (expected, coordinate.to_string())
+            })?;
         }
     }
     Ok(())

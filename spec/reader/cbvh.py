@@ -13,7 +13,7 @@ from xxh3 import xxh3_64
 
 # 1.1
 PAGE, LINE, WORD = 4096, 64, 8
-MAJOR, MINOR = 0, 2
+MAJOR, MINOR = 0, 3
 MAX_SECTIONS = 64
 SHORT_TREELET_BYTES = 32
 NO_PARENT = 0xFFFFFFFF
@@ -21,10 +21,14 @@ PACKET = 4
 F32_PACKET_BYTES = 144
 PACKED_HEAD_BYTES = 32
 RECORD_HEAD_BITS = 14
+CORRECTIONS_HEAD_BYTES = 40
+MAX_BLOCK_BYTES = 1 << 20
 ID_GROUP = 8
 ID_ENTRY_BYTES = 6
 ID_GROUP_HEAD_BITS = 54
 TURNING_TRIANGLES = 1024
+LEAST_UNIT_BITS = 180
+MAX_SIGNIFICANT, MAX_DECIMALS = 9, 22
 LOG2_MAX_WORLD, LOG2_MAX_RADIUS, RIGID_BITS = 118, 118, 23
 STEP_U8, STEP_U4 = np.array([0x3B808081, 0x3D888889], np.uint32).view(np.float32)
 
@@ -72,7 +76,13 @@ OBJECT_RECORD = np.dtype(
         ("sphere_radius", "<f4"),
         ("radius", "<f8"),
         ("solid", "u1"),
-        ("reserved_end", "u1", 31),
+        ("predictors", "u1", 3),
+        ("digits", "u1", 3),
+        ("corrected", "u1"),
+        ("left_out", "<f4", 3),
+        ("scale", "<f8"),
+        ("convex", "u1"),
+        ("reserved_end", "u1", 3),
     ]
 )
 INSTANCE_HEAD = np.dtype([("instances", "<u4"), ("names_length", "<u4"), ("reserved", "u1", 8)])
@@ -125,6 +135,7 @@ PACKED_HEAD = np.dtype(
         ("pool_at", "<u4"),
     ]
 )
+CORRECTIONS = np.dtype([("counts", "<u4", 3), ("bits", "u1", 3), ("reserved", "u1"), ("base", "<i8", 3)])
 ID_ENTRY = np.dtype([("base", "<u4"), ("start", "<u2")])
 
 # 7.2: the bits of each field of a treelet's links, the first one and the one behind the last
@@ -205,6 +216,20 @@ PATTERNS = """
 """.split()
 PATTERNS = np.array([[int(digit, 16) for digit in pattern] for pattern in PATTERNS]).reshape(-1, PACKET, 3)
 RECORD_SLOTS = 6
+
+# 15.1: predictors, with the digits that each allows, and whether the origin must be 0
+SUM, SIGNIFICANT, SHORTEST, DECIMALS, SCALED = range(5)
+Predictor = namedtuple("Predictor", "name least most needs_no_origin")
+PREDICTORS = [
+    Predictor("sum", 0, 0, False),
+    Predictor("significant", 1, MAX_SIGNIFICANT, True),
+    Predictor("shortest", 0, 0, True),
+    Predictor("decimals", 0, MAX_DECIMALS, False),
+    Predictor("scaled", 0, 0, True),
+]
+# P(k) for k from -MAX_POWER to MAX_POWER. Parsing a number rounds to nearest, but 10.0**k need not.
+MAX_POWER = 64
+POWERS = np.array([float(f"1e{k}") for k in range(-MAX_POWER, MAX_POWER + 1)])
 
 
 def ceil_div(a, b):
@@ -295,6 +320,60 @@ def bits_at(data, at, bits, widths):
     words = np.ndarray(size - 7, "<u8", bytes(data[at : at + size]).ljust(size, b"\0"), strides=(1,))
     masks = (np.uint64(1) << widths) - np.uint64(1)
     return words[(bits >> np.uint64(3)).astype(np.intp)] >> (bits & np.uint64(7)) & masks
+
+
+def ordered(numbers):
+    """The ordered numbers of f32 or f64 numbers, or the numbers of ordered numbers (1.1)."""
+    kind, mask = {
+        "float32": (np.int32, 0x7FFFFFFF),
+        "float64": (np.int64, (1 << 63) - 1),
+        "int32": (np.float32, 0x7FFFFFFF),
+        "int64": (np.float64, (1 << 63) - 1),
+    }[numbers.dtype.name]
+    bits = np.ascontiguousarray(numbers).view(f"i{numbers.dtype.itemsize}")
+    return np.where(bits >= 0, bits, bits ^ bits.dtype.type(mask)).view(kind)
+
+
+def power_of_ten(k):
+    """P(k) of 15.1. Beyond the table the result has no meaning; only numbers that break R30 lead there."""
+    return POWERS[np.clip(k, -MAX_POWER, MAX_POWER) + MAX_POWER]
+
+
+def significant(s, digits):
+    """S(s, digits) of 15.1, for an array of f64."""
+    least = np.searchsorted(POWERS, np.abs(s), side="right") - 1 - MAX_POWER
+    k = digits - 1 - least
+    power = power_of_ten(np.abs(k))
+    found = np.where(k >= 0, np.rint(s * power) / power, np.rint(s / power) * power)
+    return np.where(s == 0, 0.0, found)
+
+
+def shortest(s):
+    found = significant(s, 9)
+    for digits in (8, 7, 6):
+        candidate = significant(s, digits)
+        found = np.where(candidate.astype(np.float32).astype(np.float64) == s, candidate, found)
+    return found
+
+
+def coordinates(predictor, digits, origin, scale, offsets, corrections):
+    """The coordinates of an axis from its offsets, an array of f32, and their corrections, an array of i64 (15.1)."""
+    with np.errstate(all="ignore"):  # R30 and R37 find what is not finite
+        s = np.float64(origin) + offsets.astype(np.float64)
+        if predictor == SCALED:
+            number = ordered((s / np.float64(scale)).astype(np.float32))
+            number = number + corrections.astype(np.int32)  # both wrap around
+            return ordered(number).astype(np.float64) * np.float64(scale) + 0.0  # -0 + 0 is 0
+        if predictor == SUM:
+            p = s
+        elif predictor == SIGNIFICANT:
+            p = significant(s, digits)
+        elif predictor == SHORTEST:
+            p = shortest(s)
+        else:
+            p = np.rint(s * power_of_ten(digits)) / power_of_ten(digits)
+        p = p + 0.0
+        return np.where(corrections == 0, p, ordered(ordered(p) + corrections)) + 0.0
 
 
 class Record:
@@ -388,6 +467,10 @@ class Object(NamedRecord):
     def layout(self):
         return PROFILES[self.profile]
 
+    def is_sum(self):
+        """For each axis, whether its coordinates are sums of the origin and offsets (15.1)."""
+        return [self.predictors[axis] == SUM and not self.corrected >> axis & 1 for axis in range(3)]
+
     def page_numbers(self):
         return range(self.first_page, self.first_page + self.pages)
 
@@ -396,9 +479,13 @@ class Object(NamedRecord):
         rows = [decode(page)[page.lanes_used()] for page in self.pages_read]
         return np.concatenate(rows)
 
-    def triangles_f32(self):
-        """All triangles relative to the origin: [triangle, corner, axis], in the order of places."""
-        return self.lanes_of(Page.triangles)
+    def offsets(self):
+        """The offsets of all triangles: [triangle, corner, axis] in f32, in the order of places."""
+        return self.lanes_of(Page.offsets)
+
+    def vertices(self):
+        """The vertices of all triangles: [triangle, corner, axis] in f64, in the order of places."""
+        return self.lanes_of(Page.vertices)
 
     def ids(self):
         return self.lanes_of(Page.ids)
@@ -408,10 +495,10 @@ class Object(NamedRecord):
         return self.lanes_of(Page.places)
 
     def traversals(self):
-        """The edges that the triangles traverse (3.2): of each the place in `triangles_f32` of its triangle, a number of
+        """The edges that the triangles traverse (3.2): of each the place in `vertices` of its triangle, a number of
         the edge, and 1 if it is traversed from the lesser vertex to the greater one, else -1.
         """
-        bits = (self.triangles_f32() + np.float32(0)).reshape(-1, 3).view(np.uint32)  # -0 + 0 is 0
+        bits = self.vertices().reshape(-1, 3).view(np.uint64)  # no coordinate is -0
         vertices = np.unique(bits, axis=0, return_inverse=True)[1].reshape(-1, 3)
         start, end = vertices.ravel(), np.roll(vertices, -1, axis=1).ravel()
         triangle = np.arange(len(start)) // 3
@@ -636,10 +723,17 @@ class Page(Record):
         """The offsets in the block at which the three arrays must start, and that at which the last one ends."""
         return np.cumsum([PACKED_HEAD_BYTES, *(ceil_div(bits, 8) for bits in self.packed_arrays(head))]).tolist()
 
-    def leaf_bytes_needed(self):
+    def packet_bytes(self):
+        """The bytes that the packets take (11.1, 11.2)."""
         if not self.is_packed():
             return F32_PACKET_BYTES * self.packets
         return self.packed_places(self.packed_head())[-1] + 8
+
+    def leaf_bytes_needed(self):
+        """The bytes of the block before zeros fill its last line."""
+        if not self.is_corrected():
+            return self.packet_bytes()
+        return self.corrections_at() - self.leaf_block_at() + self.correction_places(self.corrections_head())[-1] + 8
 
     def packed_records(self, head):
         """The patterns [packet], the rotations of lanes [packet, lane], and the slots of records [packet, slot]."""
@@ -691,17 +785,17 @@ class Page(Record):
         pool = np.empty(numbers.shape, np.float32)
         for axis, (kind, exponent) in enumerate(zip(kinds_of_axes(head), head.exponent.tolist())):
             n = numbers[:, axis]
-            if kind == ORDERED:
-                pool[:, axis] = np.where(n >= 0, n, n ^ np.int32(0x7FFFFFFF)).view(np.float32)
-            else:
-                # Parsing a number rounds to nearest, but 10.0**-exponent need not.
-                power = 2.0**exponent if kind == BINARY else float(f"1e-{exponent}")
-                with np.errstate(over="ignore"):  # R30 finds what overflows
-                    pool[:, axis] = (n * np.float64(power)).astype(np.float32)
+            with np.errstate(over="ignore"):  # R30 finds what overflows
+                if kind == ORDERED:
+                    pool[:, axis] = ordered(n)
+                elif kind == BINARY:
+                    pool[:, axis] = (n * np.float64(2.0**exponent)).astype(np.float32)
+                else:
+                    pool[:, axis] = (n / power_of_ten(exponent)).astype(np.float32)
         return pool
 
-    def triangles(self):
-        """All lanes of all packets, relative to the origin: [packet, lane, corner, axis], in f32."""
+    def offsets(self):
+        """The offsets in all lanes of all packets: [packet, lane, corner, axis], in f32."""
         if self.packets == 0:
             return np.empty((0, PACKET, 3, 3), np.float32)
         if self.is_packed():
@@ -710,6 +804,72 @@ class Page(Record):
             return self.packed_pool(head).take(corners, axis=0, mode="clip")  # also safe before R29 is checked
         rows = np.frombuffer(self.data, "<f4", 36 * self.packets, self.leaf_block_at())
         return rows.reshape(-1, 3, 3, PACKET).transpose(0, 3, 1, 2)
+
+    # Corrections (11.3) and vertices (15.1)
+
+    def is_corrected(self):
+        """Whether the block has corrections."""
+        return self.owner.corrected > 0 and self.packets > 0
+
+    def corrections_at(self):
+        return self.leaf_block_at() + aligned(self.packet_bytes(), LINE)
+
+    def corrections_head(self):
+        return Record(CORRECTIONS, self.data, self.corrections_at())
+
+    def corner_count(self):
+        return int(self.packed_head().vertices) if self.is_packed() else 3 * PACKET * self.packets
+
+    def correction_places(self, head):
+        """The offsets, from the start of the corrections, at which the lists of the three axes and then their arrays
+        start, and the one at which the last array ends.
+        """
+        counts, corners = head.counts.tolist(), self.corner_count()
+        lists = [2 * count if count < corners else 0 for count in counts]
+        arrays = [ceil_div(count * width, 8) for count, width in zip(counts, head.bits.tolist())]
+        return np.cumsum([CORRECTIONS_HEAD_BYTES, *lists, *arrays]).tolist()
+
+    def correction_lists(self, head):
+        """For each axis, the numbers of the corners that have a correction."""
+        corners, places = self.corner_count(), self.correction_places(head)
+        return [
+            np.frombuffer(self.data, "<u2", count, self.corrections_at() + at).astype(np.intp)
+            if count < corners
+            else np.arange(count)
+            for count, at in zip(head.counts.tolist(), places)
+        ]
+
+    def correction_values(self, head):
+        """For each axis, the corrections that are stated, as i64."""
+        found = []
+        for axis, at in enumerate(self.correction_places(head)[3:6]):
+            width, count, start = int(head.bits[axis]), int(head.counts[axis]), self.corrections_at() + at
+            # In two parts, since a value may have more than 57 bits.
+            low = bit_values(self.data, start, 0, width, min(width, 32), count)
+            high = bit_values(self.data, start, 32, width, max(width - 32, 0), count)
+            values = low | high << np.uint64(32)
+            found.append((values + head.base[axis].astype(np.uint64)).view(np.int64))
+        return found
+
+    def corrections(self):
+        """The corrections in all lanes of all packets: [packet, lane, corner, axis], as i64. The lists are in order."""
+        corners = np.zeros((self.corner_count(), 3), np.int64)
+        head = self.corrections_head()
+        for axis, (listed, values) in enumerate(zip(self.correction_lists(head), self.correction_values(head))):
+            corners[listed, axis] = values
+        if self.is_packed():
+            return corners.take(self.packed_corners(self.packed_head()), axis=0, mode="clip")
+        return corners.reshape(-1, 3, PACKET, 3).transpose(0, 2, 1, 3)
+
+    def vertices(self):
+        """The vertices in all lanes of all packets: [packet, lane, corner, axis], in f64."""
+        offsets, one = self.offsets(), self.owner
+        corrections = self.corrections() if self.is_corrected() else np.zeros(offsets.shape, np.int64)
+        found = np.empty(offsets.shape)
+        for axis in range(3):
+            rule = int(one.predictors[axis]), int(one.digits[axis]), one.origin[axis], one.scale
+            found[..., axis] = coordinates(*rule, offsets[..., axis], corrections[..., axis])
+        return found
 
     # Id block (12)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 import cbvh
 from cbvh import LEAF, LINE, PAGE, REMOTE, SHORT, SORTS, TREELET, WORD, sort_of
+from rules import exact_sum_outward, round_outward_to_f32
 
 
 def violations(file):
@@ -136,39 +137,77 @@ def of_names(file, kind, records, where):
 
 
 def of_object(one):
-    corners = one.triangles_f32()
-    vertices = corners.reshape(-1, 3)
+    corners, vertices = one.offsets(), one.vertices()
+    offsets = corners.reshape(-1, 3)
     where = f"object {one.number}"
-    if not np.array_equal(one.box_lo, vertices.min(0)) or not np.array_equal(one.box_hi, vertices.max(0)):
-        yield f"(3) {where}: box {one.box_lo} to {one.box_hi}, vertices {vertices.min(0)} to {vertices.max(0)}"
-    numbers = np.concatenate([vertices.ravel(), one.origin, one.box_lo, one.box_hi])
+    left_out = one.left_out.astype(np.float64)
+    down, up = exact_sum_outward(vertices.reshape(-1, 3), -one.origin, -offsets.astype(np.float64))
+    greatest = round_outward_to_f32(left_out, np.maximum(-down, up).max(0, initial=0))[1]
+    if (one.left_out != greatest).any():
+        yield f"(15.1) {where}: left_out {one.left_out}, found {greatest}"
+    low, high = (offsets.min(0).astype(np.float64), offsets.max(0).astype(np.float64))
+    zeros = np.zeros(3)
+    low, high = round_outward_to_f32(
+        exact_sum_outward(low, -left_out, zeros)[0], exact_sum_outward(high, left_out, zeros)[1]
+    )
+    if not np.array_equal(one.box_lo, low) or not np.array_equal(one.box_hi, high):
+        yield f"(15.5) {where}: box {one.box_lo} to {one.box_hi}, vertices {low} to {high}"
+    numbers = np.concatenate([offsets.ravel(), one.origin, one.box_lo, one.box_hi, one.left_out, [one.scale]])
     if ((numbers == 0) & np.signbit(numbers)).any():
         yield f"(15.1) {where}: -0"
-    if not sphere_holds(one, vertices):
+    for axis in range(3):
+        is_f32 = (vertices[..., axis].astype(np.float32) == vertices[..., axis]).all()
+        if one.triangle_encoding != 2 and is_f32 and (one.origin[axis] or not one.is_sum()[axis]):
+            yield f"(15.1) {where}: an origin, a predictor or corrections of f32 numbers on axis {axis}"
+    if not sphere_holds(one, offsets):
         yield f"(3) {where}: vertices outside the sphere"
-    found = sum(is_flat(triangle) for triangle in corners[maybe_flat(corners)])
+    found = sum(is_flat(triangle) for triangle in vertices[maybe_flat(vertices)])
     if found != one.degenerate:
         yield f"(15.3) {where}: degenerate is {one.degenerate}, found {found}"
     if one.triangle_encoding != 2 and one.max_quantization_error != 0:
         yield f"(15.2) {where}: max_quantization_error {one.max_quantization_error}"
+    if one.triangle_encoding != 2 and one.max_vertex_rounding > 2.0**-239:
+        yield f"(15.1) {where}: max_vertex_rounding {one.max_vertex_rounding}"
+    if one.convex and not is_convex(one, vertices):
+        yield f"(15.6) {where}: not closed, not in one component, or a vertex beyond a triangle of a convex object"
 
 
-def sphere_holds(one, vertices):
-    """Decides exactly, for those vertices whose squared distance in f64 is within a millionth of the greatest."""
-    squares = ((vertices.astype(np.float64) - one.sphere_centre) ** 2).sum(1)
+def is_convex(one, triangles):
+    """Decides exactly whether an object is convex. Slow: for small objects."""
+    triangle, edge, way = one.traversals()
+    sums = np.zeros(edge.max(initial=-1) + 1, int)
+    np.add.at(sums, edge, way)
+    if sums.any() and not one.duplicates or len(least_of_components(one.places(), triangle, edge)) > 1:
+        return False
+    points = [[Fraction(value) for value in point] for point in np.unique(triangles.reshape(-1, 3), axis=0).tolist()]
+    for p, q, r in triangles.tolist():
+        u, v = ([Fraction(end) - Fraction(start) for end, start in zip(corner, p)] for corner in (q, r))
+        normal = [u[i] * v[j] - u[j] * v[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+        height = sum(n * Fraction(c) for n, c in zip(normal, p))
+        if any(sum(n * c for n, c in zip(normal, point)) > height for point in points):
+            return False
+    return True
+
+
+def sphere_holds(one, offsets):
+    """Decides exactly, for those offsets whose squared distance in f64 is within a millionth of the greatest."""
+    squares = ((np.abs(offsets.astype(np.float64) - one.sphere_centre) + one.left_out) ** 2).sum(1)
     centre, radius = [Fraction(float(c)) for c in one.sphere_centre], Fraction(one.sphere_radius)
-    far = np.unique(vertices[squares >= squares.max() * (1 - 1e-6)], axis=0)
-    return all(sum((Fraction(float(v[a])) - centre[a]) ** 2 for a in range(3)) <= radius**2 for v in far)
+    left_out = [Fraction(float(most)) for most in one.left_out]
+    far = np.unique(offsets[squares >= squares.max() * (1 - 1e-6)], axis=0)
+    return all(
+        sum((abs(Fraction(float(v[a])) - centre[a]) + left_out[a]) ** 2 for a in range(3)) <= radius**2 for v in far
+    )
 
 
 def maybe_flat(corners):
     """True for triangles whose normal may be 0, as far as f64 can tell.
 
-    Differences of f32 are rounded once, products once, and a coordinate of the normal is one more difference. That
+    Differences are rounded once, products once, and a coordinate of the normal is one more difference. That
     makes 4 roundings of the magnitudes; a bound of 8 also covers the rounding of the magnitudes. The constant covers
     underflow.
     """
-    u, v = ((corners[:, i].astype(np.float64) - corners[:, 0]) for i in (1, 2))
+    u, v = (corners[:, i] - corners[:, 0] for i in (1, 2))
     sizes = np.abs(u[:, [1, 2, 0]] * v[:, [2, 0, 1]]) + np.abs(u[:, [2, 0, 1]] * v[:, [1, 2, 0]])
     return (np.abs(np.cross(u, v)) <= 8 * 2.0**-53 * sizes + 2.0**-1060).all(axis=1)
 
@@ -258,22 +297,27 @@ def of_leaf_block(page, lines):
     where = f"(11) page {page.number}"
     if page.leaf_line != lines:
         yield f"(10) page {page.number}: leaf block at line {page.leaf_line}, expected {lines}"
-    lanes, used = page.triangles(), page.lanes_used()
+    used = page.lanes_used()
+    # The bits of the offsets and the corrections of each corner
+    lanes = page.offsets().view(np.uint32).astype(np.int64)
+    if page.is_corrected():
+        lanes = np.concatenate([lanes, page.corrections()], axis=3)
+        yield from of_corrections(page)
     last = used.sum(axis=1) - 1
-    repeated = lanes[np.arange(page.packets), last][:, None]
-    if (lanes.view(np.uint32) != repeated.view(np.uint32))[~used].any():
+    if (lanes != lanes[np.arange(page.packets), last][:, None])[~used].any():
         yield f"(10) page {page.number}: lanes after the last triangle do not repeat it"
     block = page.leaf_block()
+    block = block[: cbvh.aligned(page.packet_bytes(), LINE)]
     if not page.is_packed():
-        if any(block[page.leaf_bytes_needed() :]):
-            yield f"{where}: the end of the block is not zero"
+        if any(block[page.packet_bytes() :]):
+            yield f"{where}: bytes after the packets are not zero"
         return
     head = page.packed_head()
     starts = [cbvh.PACKED_HEAD_BYTES, head.further_at, head.pool_at, len(block)]
     for start, end, bits in zip(starts, starts[1:], page.packed_arrays(head)):
         if int.from_bytes(block[start:end], "little") >> bits:
             yield f"{where}: bits after an array are not zero"
-    points = (lanes.view(np.uint32) == lanes[:, :, :1].view(np.uint32)).all()
+    points = (lanes == lanes[:, :, :1]).all()
     if points != cbvh.has_points(head):
         yield f"{where}: a block of points exactly where all triangles are points"
     pattern, _, held = page.packed_records(head)
@@ -283,6 +327,18 @@ def of_leaf_block(page, lines):
         exact = page.packed_numbers(head)[:, axis] * 2.0 ** int(head.exponent[axis])
         if kind == cbvh.BINARY and (exact != page.packed_pool(head)[:, axis]).any():
             yield f"{where}: binary coordinates of axis {axis} are rounded"
+
+
+def of_corrections(page):
+    """Zeros in the head and behind lists and arrays of corrections (1.2, 11.3)."""
+    head, where = page.corrections_head(), f"(11.3) page {page.number}"
+    if head.reserved or (head.bits[head.counts == 0] != 0).any() or (head.base[head.counts == 0] != 0).any():
+        yield f"{where}: nonzero bytes without meaning in the head of the corrections"
+    block = page.leaf_block()[page.corrections_at() - page.leaf_block_at() :]
+    places = page.correction_places(head)[3:]
+    for count, width, start, end in zip(head.counts.tolist(), head.bits.tolist(), places, [*places[1:3], len(block)]):
+        if int.from_bytes(block[start:end], "little") >> count * width:
+            yield f"{where}: bits after an array of corrections are not zero"
 
 
 def of_id_block(page, words):

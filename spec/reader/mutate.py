@@ -45,6 +45,7 @@ def places(data, only=""):
         if kind in (cbvh.OBJECTS, cbvh.DUPLICATES, cbvh.INSTANCES, cbvh.TOPOLOGY):
             sorts[kind] += range(entry.offset, entry.offset + entry.length)
     for one in file.objects:
+        sorts["predictors"] += range(one.place("predictors"), one.place("reserved_end"))
         for page in one.pages_read:
             sorts["page header"] += range(page.at, page.at + cbvh.LINE)
             sorts["short counts"] += (page.place("treelets"), page.place("short"))
@@ -64,6 +65,11 @@ def places(data, only=""):
             if page.packets:
                 at = page.leaf_block_at()
                 sorts["leaf heads"] += range(at, at + 40)
+                if page.is_corrected():
+                    start = page.corrections_at()
+                    values = start + page.correction_places(page.corrections_head())[3]
+                    sorts["corrections: head and lists"] += range(start, values)
+                    sorts["corrections: values"] += range(values, at + cbvh.LINE * page.leaf_lines)
                 if page.is_packed():
                     sorts["records"] += range(at + cbvh.PACKED_HEAD_BYTES, at + page.packed_head().pool_at)
             if page.id_words:

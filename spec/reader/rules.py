@@ -1,4 +1,4 @@
-"""Checks the rules R01 to R49 of spec/format.md, section 16, in the order in which a reader reports them.
+"""Checks the rules R01 to R52 of spec/format.md, section 16, in the order in which a reader reports them.
 
 Each top-level function makes the checks of one time of 16.1. It raises `Broken` for the first broken rule. The
 exception names the rule, the byte of the file, what was expected and what was found. Code after a check relies on it.
@@ -14,6 +14,7 @@ from cbvh import TOPOLOGY, TREELET, sort_of
 from xxh3 import xxh3_64
 
 MAX_COORDINATE = 2.0**120  # R12, R30
+MAX_BOX = 2.0**121  # R12
 MAX_SLAB = 2.0**122  # R19, R38
 MAX_WORLD = 2.0**cbvh.LOG2_MAX_WORLD  # R42
 MAX_RIGID_ERROR = 2.0**-cbvh.RIGID_BITS  # R42
@@ -146,6 +147,7 @@ def check_objects(file):
             "0 to 2",
             one.triangle_encoding,
         )
+        check_predictors(one)
         file.objects.append(one)
     nodes = file.sections[NODES]
     need(first_page * PAGE == nodes.length, 13, nodes.place("length"), first_page * PAGE, nodes.length)
@@ -157,10 +159,11 @@ def check_numbers(one, first):
     def need_field(field, holds, expected):
         need(holds, 12, one.place(field), expected, getattr(one, field))
 
-    for field in ("origin", "box_lo", "box_hi", "sphere_centre"):
+    for field in ("origin", "sphere_centre"):
         need_field(field, is_within(getattr(one, field), MAX_COORDINATE), "at most 2^120 in magnitude")
-    # The product is at most 2^269, so it is exact.
-    need_field("origin", bool((np.modf(one.origin * 2.0**149)[0] == 0).all()), "multiples of 2^-149")
+    for field in ("box_lo", "box_hi"):
+        need_field(field, is_within(getattr(one, field), MAX_BOX), "at most 2^121 in magnitude")
+    need_field("origin", bool(are_on_unit(one.origin).all()), "multiples of 2^-180")
     need_field("box_lo", bool((one.box_lo <= one.box_hi).all()), "at most box_hi")
     need_field("max_vertex_rounding", 0 <= one.max_vertex_rounding <= MAX_COORDINATE, "0 to 2^120")
     need_field("max_quantization_error", 0 <= one.max_quantization_error <= MAX_COORDINATE, "0 to 2^120")
@@ -173,6 +176,32 @@ def check_numbers(one, first):
     need_field("solid", one.solid <= 1, "0 or 1")
     need_field("radius", repr(one.radius) == repr(first.radius), "that of object 0")
     need_field("solid", one.solid == first.solid, "that of object 0")
+
+
+def check_predictors(one):
+    """Checks R12 for the fields of an object record that state how its vertices follow from offsets."""
+
+    def need_field(field, holds, expected):
+        need(holds, 12, one.place(field), expected, getattr(one, field))
+
+    need_field("predictors", bool((one.predictors < len(cbvh.PREDICTORS)).all()), "0 to 4")
+    need_field("corrected", one.corrected <= 7, "at most 7")
+    for axis, predictor in enumerate(cbvh.PREDICTORS[number] for number in one.predictors.tolist()):
+        digits, is_sum = int(one.digits[axis]), one.is_sum()[axis]
+        need_field("digits", predictor.least <= digits <= predictor.most, f"those of {predictor.name}")
+        need_field("origin", one.origin[axis] == 0 or not predictor.needs_no_origin, f"0 for {predictor.name}")
+        need_field("left_out", bool(0 <= one.left_out[axis] <= MAX_COORDINATE), "0 to 2^120")
+        need_field("left_out", one.left_out[axis] == 0 or not is_sum, "0 for sums")
+    if cbvh.SCALED in one.predictors.tolist():
+        need_field("scale", bool(2.0**-1022 <= abs(one.scale) < np.inf), "a normal number")
+    else:
+        need_field("scale", one.scale == 0, "0")
+    need_field("convex", one.convex <= 1, "0 or 1")
+
+
+def are_on_unit(numbers):
+    """True for those numbers of at most 2^122 that are multiples of 2^-180 (R12, R37). The product is exact."""
+    return np.modf(numbers * 2.0**cbvh.LEAST_UNIT_BITS)[0] == 0
 
 
 # Touch
@@ -305,9 +334,14 @@ def check_leaf_block(page):
         lines = cbvh.ceil_div(page.leaf_bytes_needed(), cbvh.LINE)
         need(page.leaf_lines == lines, 26, page.place("leaf_lines"), lines, page.leaf_lines)
 
-    if not page.is_packed():
+    block, is_corrected = page.leaf_block(), page.is_corrected()
+    if is_corrected:
+        length = cbvh.LINE * page.leaf_lines
+        need(len(block) == length, 26, page.place("leaf_line"), f"an end within {section.length} bytes", "one beyond")
+        most = cbvh.MAX_BLOCK_BYTES
+        need(length <= most, 26, page.place("leaf_lines"), f"at most {most} bytes", length)
+    elif not page.is_packed():
         check_place()
-    block = page.leaf_block()
     need_checksum(27, page.place("leaf_checksum"), page.leaf_checksum, block)
     if page.is_packed() and page.packets:
         need(len(block) >= cbvh.PACKED_HEAD_BYTES, 28, page.place("leaf_lines"), "a head", f"{len(block)} bytes")
@@ -326,6 +360,16 @@ def check_leaf_block(page):
         _, further_at, pool_at, _ = page.packed_places(head)
         need(head.further_at == further_at, 28, head.place("further_at"), further_at, head.further_at)
         need(head.pool_at == pool_at, 28, head.place("pool_at"), pool_at, head.pool_at)
+        if not is_corrected:
+            check_place()
+    if is_corrected:
+        end = page.corrections_at() - page.leaf_block_at() + cbvh.CORRECTIONS_HEAD_BYTES
+        need(end <= len(block), 26, page.place("leaf_lines"), f"a head of corrections up to byte {end}", len(block))
+        head, corners = page.corrections_head(), page.corner_count()
+        for axis in range(3):
+            most = corners if page.owner.corrected >> axis & 1 else 0
+            need(head.counts[axis] <= most, 52, head.place("counts"), f"at most {most} of axis {axis}", head.counts)
+        need(bool((head.bits <= 64).all()), 52, head.place("bits"), "at most 64", head.bits)
         check_place()
 
 
@@ -488,6 +532,7 @@ def validate_object(one):
         page = touch(one, number)
         check_leaf_block(page)
         check_id_block(page)
+        check_lists(page)
         check_packets(page)
         one.pages_read.append(page)
     for page in one.pages_read:
@@ -500,23 +545,39 @@ def validate_object(one):
     check_counts(one)
 
 
+def check_lists(page):
+    """Checks R52 for the lists of corrections of a page."""
+    if not page.is_corrected():
+        return
+    head = page.corrections_head()
+    for axis, listed in enumerate(page.correction_lists(head)):
+        holds = (np.diff(listed) > 0).all() and listed.max(initial=-1) < page.corner_count()
+        need(bool(holds), 52, page.corrections_at(), f"ascending corners of axis {axis}", listed)
+
+
 def check_packets(page):
-    """Checks each packet of a page in turn: its record (R29), each coordinate (R30 and R37), and ids (R33)."""
+    """Checks each packet of a page in turn: its record (R29), each offset (R30, and R37 on axes that are sums), each
+    coordinate on other axes (R37), and ids (R33).
+    """
     bad_record = np.zeros(page.packets, bool)
     if page.is_packed() and page.packets and not cbvh.has_points(page.packed_head()):
         head = page.packed_head()
         _, rotation, _ = page.packed_records(head)
         slots, number = page.packed_slots(head)
         bad_record = ((slots >= head.vertices) | (number >= head.further)).any(axis=1) | (rotation > 2).any(axis=1)
-    values = page.triangles().transpose(0, 2, 3, 1)  # packet, corner, axis, lane: the order of the block
+    offsets, sums = page.offsets(), np.array(page.owner.is_sum())
+    values = offsets.transpose(0, 2, 3, 1)  # packet, corner, axis, lane: the order of the block
     origin = np.broadcast_to(page.owner.origin[:, None], values.shape)
     too_large = ~(np.abs(values) <= MAX_COORDINATE)
     with np.errstate(invalid="ignore"):  # infinities are found by `too_large`
-        bad_value = too_large | (error_of_sum(origin, values.astype(np.float64)) != 0)
+        bad_value = too_large | (error_of_sum(origin, values.astype(np.float64)) != 0) & sums[:, None]
+    bad_vertex = np.zeros(page.packets, bool)
+    if not sums.all():
+        bad_vertex = ~(are_near(page.owner, offsets, page.vertices()) | sums).all(axis=(1, 2, 3))
     ids = page.ids()
     bad_id = (ids >= page.owner.input_triangles) & page.lanes_used() & (page.id_words > 0)
 
-    bad = bad_record | bad_value.any(axis=(1, 2, 3)) | bad_id.any(axis=1)
+    bad = bad_record | bad_value.any(axis=(1, 2, 3)) | bad_vertex | bad_id.any(axis=1)
     if not bad.any():
         return
     packet = int(bad.argmax())
@@ -527,10 +588,22 @@ def check_packets(page):
         raise Broken(29, block, expected, found)
     if bad_value[packet].any():
         place = (packet, *np.argwhere(bad_value[packet])[0])
-        need(not too_large[place], 30, block, "a finite coordinate of at most 2^120", values[place])
-        raise Broken(37, block, f"{origin[place]} + a coordinate to be an f64 number", values[place])
+        need(not too_large[place], 30, block, "a finite offset of at most 2^120", values[place])
+        raise Broken(37, block, f"{origin[place]} + an offset to be an f64 number", values[place])
+    if bad_vertex[packet]:
+        expected = f"multiples of 2^-180 within {page.owner.left_out} of their offsets in packet {packet}"
+        raise Broken(37, block, expected, page.vertices()[packet].tolist())
     found = ids[packet][bad_id[packet]][0]
     raise Broken(33, page.id_block_at(), f"an id below {page.owner.input_triangles}", found)
+
+
+def are_near(one, offsets, vertices):
+    """True for coordinates that are as near to their offsets as an object states, and multiples of 2^-180 (R37)."""
+    with np.errstate(all="ignore"):  # comparisons are false for NaN
+        down, up = exact_sum_outward(vertices, -one.origin, -offsets.astype(np.float64))
+        left_out = one.left_out.astype(np.float64)
+        near = (-left_out <= down) & (up <= left_out)
+        return near & are_on_unit(np.where(near, vertices, 0))
 
 
 def check_counts(one):
@@ -583,20 +656,47 @@ def verify(file):
             below.update({(page.number, root): own[root] for root in range(page.roots)})
             verify_page(page, own, children)
         whole = below[one.first_page, 0]
-        if not ((one.box_lo <= whole.lo[:3]) & (whole.hi[:3] <= one.box_hi)).all():
+        margins = margins_along(cbvh.DIRECTIONS[:3], one.left_out)
+        if not are_wide_enough(one.box_lo, one.box_hi, whole.lo[:3], whole.hi[:3], margins).all():
             raise Broken(35, one.place("box_lo"), f"a box around {whole.lo[:3]} to {whole.hi[:3]}", one.box_lo)
+
+
+def margins_along(directions, left_out):
+    """The m of directions [..., axis] with integer coordinates (15.5). Products are exact."""
+    x, y, z = np.moveaxis(np.abs(directions) * left_out.astype(np.float64), -1, 0)
+    return exact_sum_outward(x, y, z)[1]
+
+
+def are_wide_enough(lo, hi, low, high, margins):
+    """True for slabs [lo, hi] that contain f32 numbers from `low` to `high` and what margins add. False for NaN.
+
+    An end is an f64 number. It is therefore at most the exact difference if and only if it is at most the difference
+    rounded down.
+    """
+    zeros = np.zeros_like(margins)
+    down, up = exact_sum_outward(low, -margins, zeros)[0], exact_sum_outward(high, margins, zeros)[1]
+    return (lo <= down) & (up <= hi)
+
+
+def round_outward_to_f32(low, high):
+    """The greatest f32 that are at most `low`, and the least that are at least `high`, as f64."""
+    down, up = low.astype(np.float32), high.astype(np.float32)
+    down = np.where(down > low, np.nextafter(down, np.float32(-np.inf)), down)
+    up = np.where(up < high, np.nextafter(up, np.float32(np.inf)), up)
+    return down.astype(np.float64), up.astype(np.float64)
 
 
 def verify_page(page, own, children):
     _, _, lo, hi = page.decode()
+    margins = margins_along(cbvh.DIRECTIONS[: page.layout.slabs], page.owner.left_out)
     for root in range(page.roots):
-        need_contained(page.anchor_at(root), "anchor", *page.anchor(root), own[root])
+        need_contained(page.anchor_at(root), "anchor", *page.anchor(root), own[root], margins)
     turning = turning_slabs_that_hold(page, lo, hi, children)
     in_sphere = packets_in_sphere(page)
     for slot in range(page.treelets):
         at = page.treelet_at(slot)
         for child, (subtree, (kind, target)) in enumerate(zip(children[slot], page.targets(slot))):
-            need_contained(at, f"child {child}", lo[slot, child], hi[slot, child], subtree)
+            need_contained(at, f"child {child}", lo[slot, child], hi[slot, child], subtree, margins)
             holds = kind < LEAF or in_sphere[target]
             need(holds, 35, page.owner.place("sphere_radius"), f"a sphere around packet {target}", "one that cuts")
             if (slot, child) in turning:
@@ -608,8 +708,8 @@ def verify_page(page, own, children):
 def packets_in_sphere(page):
     """Whether the sphere of the record contains the triangles of each packet, in the arithmetic of 15.5."""
     centre, radius = page.owner.sphere_centre.astype(np.float64), np.float64(page.owner.sphere_radius)
-    corners, used = page.triangles().astype(np.float64), page.lanes_used()
-    x, y, z = np.moveaxis(corners - centre, -1, 0)
+    corners, used = page.offsets().astype(np.float64), page.lanes_used()
+    x, y, z = np.moveaxis(np.abs(corners - centre) + page.owner.left_out.astype(np.float64), -1, 0)
     inside = (x * x + y * y) + z * z <= radius * radius
     return (inside | ~used[..., None]).all(axis=(1, 2))
 
@@ -639,22 +739,27 @@ def join(parts):
     return Subtree(np.min(lows, axis=0), np.max(highs, axis=0), count, kept)
 
 
-def need_contained(at, what, lo, hi, subtree):
-    good = (lo <= subtree.lo) & (subtree.hi <= hi)  # false for NaN
+def need_contained(at, what, lo, hi, subtree, margins):
+    good = are_wide_enough(lo, hi, subtree.lo, subtree.hi, margins)
     if not good.all():
         slab = int((~good).argmax())
-        expected = f"slab {slab} of {what} around [{subtree.lo[slab]}, {subtree.hi[slab]}]"
+        expected = f"slab {slab} of {what} {margins[slab]} around [{subtree.lo[slab]}, {subtree.hi[slab]}]"
         raise Broken(35, at, expected, f"[{lo[slab]}, {hi[slab]}]")
 
 
 def turning_slabs_that_hold(page, lo, hi, children):
     """Whether the turning slab of each child that has one contains the triangles below, by slot and child.
 
-    256 n has integer coordinates of at most 9 bits, so its products with f32 coordinates are exact in f64. Ends are
-    compared as in `subtrees_of_packets`. The value for a child with too many triangles (R39) has no meaning.
+    256 n has integer coordinates of at most 9 bits, so its products with f32 numbers are exact in f64. An end is at
+    most the exact projection if and only if it is at most the projection rounded down, since ends are f64 numbers. The
+    value for a child with too many triangles (R39) has no meaning.
     """
     codes = page.turning_codes()
     ends_lo, ends_hi = (256 * ends.astype(np.float64) for ends in cbvh.decode_turning(codes, lo[..., :3], hi[..., :3]))
+    margins = margins_along(cbvh.turning_directions(codes), page.owner.left_out)
+    with np.errstate(invalid="ignore"):  # a damaged treelet may decode to anything
+        _, ends_lo = exact_sum_outward(ends_lo, margins, np.zeros_like(margins))
+        ends_hi, _ = exact_sum_outward(ends_hi, -margins, np.zeros_like(margins))
     found = ((slot, child) for slot in range(page.treelets) for child in range(len(children[slot])))
     holds = {place: False for place in found if codes[place].any()}
     small = [(slot, child) for slot, child in holds if children[slot][child].points is not None]
@@ -672,19 +777,16 @@ def turning_slabs_that_hold(page, lo, hi, children):
 
 
 def subtrees_of_packets(page):
-    """The subtree of each packet, with projections rounded outward to f64.
-
-    An f32 end is also an f64 number. It is therefore at most the exact projection if and only if it is at most the
-    projection rounded down, so comparing it with the result is exact.
-    """
-    corners, used = page.triangles().astype(np.float64), page.lanes_used()
+    """The subtree of each packet, with projections of offsets rounded outward to f32 (15.5)."""
+    corners, used = page.offsets().astype(np.float64), page.lanes_used()
     corners = np.where(used[..., None, None], corners, corners[:, :1])  # the other lanes hold no triangles
     lows, highs = [], []
     for direction in cbvh.DIRECTIONS[: page.layout.slabs]:
         low, high = exact_sum_outward(*(corners[..., axis] * float(direction[axis]) for axis in range(3)))
         lows.append(low.min(axis=(1, 2)))
         highs.append(high.max(axis=(1, 2)))
-    lows, highs, counts = np.stack(lows, axis=1), np.stack(highs, axis=1), used.sum(axis=1).tolist()
+    lows, highs = round_outward_to_f32(np.stack(lows, axis=1), np.stack(highs, axis=1))
+    counts = used.sum(axis=1).tolist()
     if page.layout.turning:
         points = [lanes[:count].reshape(-1, 3) for lanes, count in zip(corners, counts)]
     else:

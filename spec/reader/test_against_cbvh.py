@@ -29,7 +29,7 @@ ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 TESTDATA = os.path.join(ROOT, "testdata")
 SHARED = os.path.join(ROOT, "..", "shared")
 ROBOT, ROOM = (os.path.join(TESTDATA, name) for name in ("fclrob.obj", "fclenv.obj"))
-GOLDEN = "everything", "plain", "profiles", "scene", "topology"
+GOLDEN = "everything", "plain", "profiles", "scene", "topology", "exact", "exact-f32"
 ORDERS = list(itertools.permutations(range(3)))
 
 
@@ -164,10 +164,9 @@ class AgainstCbvh(unittest.TestCase):
         self.assertEqual(sorted([*ids, *dropped]), list(range(len(expected))))
         self.assertEqual(file.weights().sum(), len(expected))
         for one in file.objects:
-            corners, given = one.triangles_f32(), expected[one.ids()]
+            stored, given = one.vertices(), expected[one.ids()]
             self.assertEqual(one.input_triangles, len(expected))
             limit = one.max_vertex_rounding + one.max_quantization_error
-            stored = corners.astype(np.float64) + one.origin
             moved = distances(stored, given).max()
             # Differences are exact here. The stated bounds exceed the distances by more than the rounding below.
             self.assertLessEqual(moved, limit)
@@ -181,9 +180,9 @@ class AgainstCbvh(unittest.TestCase):
             self.check_topology(file, one, [places[triangle] for triangle in kept[here].tolist()], orders)
             if cbvh.ENCODINGS[one.triangle_encoding] == "quantized":
                 continue
-            self.assertLessEqual(one.max_vertex_rounding, moved * (1 + 2.0**-47))
-            if not one.origin.any():
-                self.assertEqual((given.astype(np.float32) + np.float32(0)).tobytes(), corners.tobytes())
+            # No coordinate of these tests is below 2^-128 in magnitude, but for 0.
+            self.assertEqual(one.max_vertex_rounding, 0)
+            self.assertEqual((given + 0.0).tobytes(), stored.tobytes())
 
     def check_topology(self, file, one, of_duplicates, orders):
         """Recomputes nets and the boundary from the duplicates in the input, of which `orders` has the distance to each
@@ -355,6 +354,53 @@ class AgainstCbvh(unittest.TestCase):
         write_obj(mesh, [("cancel", np.array([[[1, 2.0**-60, -1], [-1, 0, -1], [0, -1, -1]]]))])
         self.check_bake(self.bake(mesh, "dop14-u8", "f32"), mesh)
 
+    def test_vertices_of_all_predictors(self):
+        """Bakes coordinates that are no f32 numbers, of each sort, and changes what their objects state about them."""
+        robot = read_obj(ROBOT)
+        small = robot.astype(np.float32).astype(float)
+        noise = small + np.random.default_rng(4).uniform(-1, 1, robot.shape) * 1e-9
+
+        # Of all magnitudes, so that no number of digits after the point suits them
+        wide = (small * 10.0 ** (np.arange(len(small)) % 5)[:, None, None]).astype(np.float32)
+
+        def parsed(form):
+            return np.array([float(form(value)) for value in wide.ravel().tolist()]).reshape(wide.shape)
+
+        parts = [
+            ("decimals", np.round(small, 3) + 0.0),
+            ("far", np.round(small, 1) + [1e7 + 0.1, 0.3, -2e8]),
+            ("six", parsed(lambda value: f"{value / 7:.5e}")),
+            ("nine", parsed(lambda value: f"{value / 7000:.8e}")),
+            ("shortest", parsed(lambda value: str(np.float32(value * 1.1)))),
+            ("metres", small * 0.001),
+            ("inches", small[:, ::-1] * 0.0254),
+            ("noise", noise),
+            ("some noise", np.where(np.arange(len(small))[:, None, None] % 9 == 0, noise, np.round(small, 2))),
+            ("tiny", np.round(small, 2) * 2.0**-150),
+        ]
+        parts = [(name, part[:120]) for name, part in parts]
+        mesh = os.path.join(self.folder, "exact.obj")
+        write_obj(mesh, parts)
+        seen, found = set(), set()
+        layouts = ("dop26-u8-wide", "packed"), ("dop14-u8", "f32"), ("dop6-f16", "packed"), ("dop14-f32", "f32")
+        for profile, triangles in layouts:
+            path = self.bake(mesh, profile, triangles, "--split-objects")
+            self.check_bake(path, mesh)
+            self.check_bake(self.bake(mesh, profile, triangles), mesh)
+            file = load(path)
+            for one in file.objects:
+                seen |= set(one.predictors.tolist()) | {f"corrected {int(one.corrected > 0)}"}
+            for _ in range(40):
+                one = self.chance.choice(file.objects)
+                data, at = bytearray(file.data), one.place("left_out") + 4 * self.chance.randrange(3)
+                value = np.frombuffer(data, "<f4", 1, at)[0]
+                near = np.nextafter(value, np.float32(self.chance.choice((0, 1))))
+                data[at : at + 4] = self.chance.choice((near, value * np.float32(3))).tobytes()
+                mutate.seal(data)
+                found.add(self.agreed(data, mesh))
+        self.assertLessEqual({12, 35, 37}, found)
+        self.assertEqual(seen, {*range(len(cbvh.PREDICTORS)), "corrected 0", "corrected 1"})
+
     def test_turning_slabs(self):
         """Changes turning slabs of one child each: `cbvh verify` and this reader find the same rule broken."""
         path = self.bake(ROOM, "dop26-u8-wide", "f32")
@@ -370,7 +416,7 @@ class AgainstCbvh(unittest.TestCase):
         changes = []
         for number in range(60):
             # The first children without one are near the root, so that R39 is reached.
-            places = self.chance.choice(there) if number % 2 else absent[number // 2]
+            places = self.chance.choice(there) if number % 2 else absent[number // 2 % len(absent)]
             if number % 4 == 1:
                 at = self.chance.choice(places)
                 changes.append({at: bytes([(file.data[at] + self.chance.choice((-1, 1, 1, 2, 5))) % 256])})
@@ -454,7 +500,7 @@ class AgainstCbvh(unittest.TestCase):
         for page in file.objects[0].pages_read:
             for packet, lane in np.argwhere(~page.lanes_used()):
                 at = page.leaf_block_at() + cbvh.F32_PACKET_BYTES * int(packet) + 4 * int(lane)
-                data[at : at + 4] = np.float32(9e9).tobytes()
+                data[at : at + 4] = np.float32(1e6).tobytes()  # which predictors leave as it is
         mutate.seal(data)
         self.assertNotEqual(data, file.data)
         self.assertEqual(self.agreed(data, ROOM), 0)
@@ -483,12 +529,15 @@ class AgainstCbvh(unittest.TestCase):
         ]
         layouts = ("dop14-u8", "f32"), ("dop6-u8", "f32"), ("dop6-f16", "packed"), ("dop26-u4", "f32")
         full = [self.bake(ROOM, *layout) for layout in layouts]
+        exact = [golden["exact"], golden["exact-f32"]]
         ids = [golden["everything"], self.bake(ROBOT, "dop14-u8", "packed")]
         for files, only, part, seed, expected in (
             ([*golden.values(), *whole], "", 1, 3, set()),
             (heads, "head", 2, 11, {2, 4, 5, 6, 7, 8, 9}),
             (heads, "offsets", 2, 12, {4, 5, 7, 8, 9}),
             (ids, "id", 2, 5, {0, 31, 32, 33}),
+            (exact, "corrections", 2, 13, {0, 26, 37, 52}),
+            (exact, "predictors", 2, 14, {0, 12, 37, 52}),
             (short, "short", 1, 9, {0, 17, 21, 22, 24, 25}),
             # Files in which no treelet is short, or can be.
             (full, "short counts", 4, 10, {17, 18, 25}),

@@ -16,7 +16,9 @@ use crate::storage::resources::Resources;
 use crate::topology::{MAX_FEW_PARTS, Nets, Survey};
 use crate::tree::{Aabb, Bricks};
 use crate::triangles::{Gathered, Kept};
+use bvh_format::kdop::Kdop;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
+use bvh_format::vertex::Vertices;
 use std::iter::Peekable;
 use std::vec::IntoIter;
 use zerocopy::FromZeros;
@@ -80,7 +82,7 @@ impl Prepared {
             (Found::Net { .. }, None) => Ok(()),
         })?;
         let advised_error = advised_error(options, diagonal(&measured.bounds), stream.count);
-        let surveyed = survey(&Kept::new(stream, &measured.dropped), &measured, resources)?;
+        let surveyed = survey(&Kept::new(stream, &measured.dropped), &measured, &gathered.behind, resources)?;
         let left_out = duplicates.count();
         Ok(Self { gathered, measured, surveyed, nets, duplicates: Some(duplicates), left_out, advised_error })
     }
@@ -106,7 +108,7 @@ impl Built {
     pub(super) fn new(prepared: Prepared, shared: &Shared) -> Result<Self, BakeError> {
         let Shared { options, resources, has_topology, id_count, .. } = *shared;
         let Prepared { gathered, measured, mut surveyed, nets, left_out, .. } = prepared;
-        let Gathered { name, origin, stream, moved, vertices, is_cloud } = gathered;
+        let Gathered { name, behind, stream, moved, vertices, is_cloud } = gathered;
         let moved = moved.joined(measured.moved).rounded_up();
         let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
@@ -116,7 +118,8 @@ impl Built {
         let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, effort, resources)?;
         let triangles = kept.count();
         drop(stream);
-        let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles));
+        let origin = behind.are_corrected().then_some(behind.origin);
+        let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles, origin));
         let (tree, of_brick) = bricks.first_tree(resources)?;
         let Choice { profile, encoding, reason } =
             layout_choice::choose(triangles, tree, of_brick, is_cloud, options);
@@ -126,6 +129,7 @@ impl Built {
             f16_scale: 2f32.powi(f16_exponent),
             ids: options.ids,
             is_cloud,
+            behind,
             turning_slabs: options.turning_slabs && profile.has_turning_slabs() && !is_cloud,
         };
         let encoded = encode_object(bricks, style, survey, resources, &shared.spill)?;
@@ -134,10 +138,11 @@ impl Built {
         if options.solid && has_topology && !is_closed {
             return Err(BakeError::NotClosed { object: excerpt(name.as_bytes()) });
         }
+        let bounds = bounds_of_vertices(&measured.bounds, &behind);
         let record = ObjectRecord {
-            origin: origin.map(Into::into),
-            box_lo: [0, 1, 2].map(|a| measured.bounds.lo(a).into()),
-            box_hi: [0, 1, 2].map(|a| measured.bounds.hi(a).into()),
+            origin: behind.origin.map(Into::into),
+            box_lo: [0, 1, 2].map(|a| bounds.lo[a].into()),
+            box_hi: [0, 1, 2].map(|a| bounds.hi[a].into()),
             triangles: triangles.into(),
             packets: encoded.packets.into(),
             treelets: encoded.treelets.into(),
@@ -154,10 +159,24 @@ impl Built {
             // -0.0 + 0.0 is 0.0.
             radius: (options.radius + 0.0).into(),
             solid: options.solid.into(),
+            predictors: behind.predictors.map(|predictor| predictor.parts().0),
+            digits: behind.predictors.map(|predictor| predictor.parts().1),
+            corrected: (0..3).map(|axis| u8::from(behind.corrected[axis]) << axis).sum(),
+            left_out: behind.left_out.map(Into::into),
+            scale: behind.scale.into(),
             ..ObjectRecord::new_zeroed()
         };
         Ok(Self { name, record, encoded, reason, vertices })
     }
+}
+
+/// Returns the box of the vertices behind offsets that have a box, around the origin.
+fn bounds_of_vertices(bounds: &Aabb, behind: &Vertices) -> Kdop {
+    let mut kdop = Kdop::EMPTY;
+    for axis in 0..3 {
+        (kdop.lo[axis], kdop.hi[axis]) = (bounds.lo(axis), bounds.hi(axis));
+    }
+    kdop.widened(&behind.margins())
 }
 
 /// Returns the diagonal of a box, in mesh units.

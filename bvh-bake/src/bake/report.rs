@@ -66,7 +66,8 @@ pub struct FileSummary {
     pub triangle_bytes: u64,
     /// The bytes of the id blocks and duplicate pairs.
     pub id_bytes: u64,
-    /// The largest distance by which rounding to f32 moved a vertex, in mesh units.
+    /// The largest distance by which a vertex moved before it was quantised, in mesh units: 0 unless it was rounded or welded on
+    /// purpose, or lay below the least unit of the format.
     pub max_vertex_rounding: f64,
     /// The largest distance by which quantisation moved a vertex, in mesh units.
     pub max_quantization_error: f64,

@@ -13,7 +13,7 @@ use crate::tree::arena::Arena;
 use crate::tree::treelets::{cut_brick, cut_top};
 use crate::tree::turning;
 use crate::tree::{Bricks, PacketTriangles, Tree};
-use crate::triangles::Triangle;
+use crate::triangles::Batch;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::PACKET;
 use std::collections::HashMap;
@@ -29,7 +29,7 @@ struct EncodedBrick {
     /// The treelets that are in no page yet, with those directly below them that are in one.
     rest: Arena,
     /// The triangles of the rest.
-    triangles: Vec<Triangle>,
+    triangles: Batch<'static>,
     /// The treelets of the rest that are in a page, counted from the brick's first page, and their places.
     placed: Vec<(u32, Place)>,
     /// The number of children of all treelets.
@@ -69,7 +69,7 @@ pub(crate) fn encode_object(
     let sum = |of: fn(&EncodedBrick) -> u64| bricks.iter().map(of).sum::<u64>();
     let children = top.child_count() + sum(|brick| brick.children);
     let (packets, treelets) = (sum(|brick| brick.packets), sum(|brick| brick.treelets));
-    let mut triangles = Vec::new();
+    let mut triangles = Batch::default();
     let (mut rests, mut parts, mut placed) = (Vec::new(), Vec::new(), Vec::new());
     let (mut topologies, mut first_places, mut next_packet) = (Vec::new(), Vec::new(), 0);
     for mut brick in bricks {
@@ -77,7 +77,7 @@ pub(crate) fn encode_object(
         first_places.push(next_packet);
         next_packet += brick.packets;
         brick.rest.renumber_triangles(triangles.len() as u32);
-        triangles.append(&mut brick.triangles);
+        triangles.append(brick.triangles);
         rests.push(brick.rest);
         parts.push(brick.pages);
         placed.push(brick.placed);
@@ -126,15 +126,15 @@ pub(crate) fn encode_object(
 fn encode_brick(
     number: usize,
     tree: Tree<PacketTriangles>,
-    triangles: &[Triangle],
+    triangles: &Batch,
     style: Style,
     survey: Option<&Survey>,
     spill: &Spill,
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
-    let mut arena = cut_brick(&tree, triangles, width, slabs, !style.is_cloud);
+    let mut arena = cut_brick(&tree, triangles, width, slabs, &style.behind, !style.is_cloud);
     if style.turning_slabs {
-        turning::fit(&mut arena, triangles);
+        turning::fit(&mut arena, triangles, style.behind.left_out);
     }
     drop(tree);
     let kdop = arena.kdop(0, slabs);
@@ -151,6 +151,6 @@ fn encode_brick(
         survey.map(|survey| survey.brick(number, triangles, &encoder.triangle_places(), &own, spill));
     let topology = topology.transpose()?;
     let pages = UnnumberedPages::new(encoded, spill)?;
-    let own = own.iter().map(|&number| triangles[number as usize]).collect();
+    let own = triangles.at(own.iter().map(|&number| number as usize));
     Ok(EncodedBrick { pages, packets, treelets, kdop, rest, triangles: own, placed, children, topology })
 }

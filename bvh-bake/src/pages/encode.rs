@@ -8,7 +8,7 @@ use crate::pages::plan::{PagePlan, Place};
 use crate::threads;
 use crate::tree::arena::Arena;
 use crate::tree::arena::ChildKind;
-use crate::triangles::Triangle;
+use crate::triangles::Batch;
 use bvh_format::leaf::PACKET;
 use bvh_format::page::{PAGE, PagePatcher, PagePlace, PageShape, PageWriter, RootRef, WrittenPage};
 
@@ -19,7 +19,7 @@ pub(crate) struct Encoder<'a> {
     /// The place of each treelet. Some treelets may be in pages that follow these.
     pub(crate) places: &'a [Place],
     /// The triangles that packets number.
-    pub(crate) triangles: &'a [Triangle],
+    pub(crate) triangles: &'a Batch<'a>,
     pub(crate) style: Style,
 }
 
@@ -92,7 +92,7 @@ impl Encoder<'_> {
     }
 
     fn page(&self, plan: &PagePlan, number: usize, parents: &[Option<(u32, u8)>]) -> WrittenPage {
-        let Style { profile, f16_scale, encoding, ids, .. } = self.style;
+        let Style { profile, f16_scale, encoding, ids, behind, .. } = self.style;
         let slabs = profile.directions().slabs();
         let PagePlan { roots, short, .. } = *plan;
         let (remotes, treelets) = (plan.remotes.len(), plan.slots.len());
@@ -109,6 +109,11 @@ impl Encoder<'_> {
                         let numbers = packet.numbers().iter();
                         let triangles = numbers.map(|&number| &self.triangles[number as usize]);
                         writer.leaf(&child.bound, triangles.map(|triangle| (triangle.corners, triangle.id)));
+                        if !self.triangles.exact.is_empty() {
+                            let exact =
+                                packet.numbers().iter().map(|&number| self.triangles.exact[number as usize]);
+                            writer.wide_leaf(&exact.collect::<Vec<_>>());
+                        }
                         continue;
                     }
                     ChildKind::Treelet(below) => self.places[*below as usize],
@@ -124,6 +129,6 @@ impl Encoder<'_> {
                 }
             }
         }
-        writer.finish(encoding, ids)
+        writer.finish(encoding, &behind, ids)
     }
 }

@@ -8,6 +8,7 @@ pub(crate) mod unnumbered;
 
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
+use bvh_format::vertex::Vertices;
 
 /// How the pages of an object are written.
 #[derive(Clone, Copy)]
@@ -19,6 +20,8 @@ pub(crate) struct Style {
     pub(crate) turning_slabs: bool,
     /// Whether all triangles are points.
     pub(crate) is_cloud: bool,
+    /// How vertices follow from offsets.
+    pub(crate) behind: Vertices,
 }
 
 impl Style {

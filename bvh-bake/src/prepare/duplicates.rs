@@ -13,8 +13,8 @@ use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
 use crate::threads;
-use crate::topology::MAX_NET;
-use crate::triangles::{Corners, TRIANGLES_PER_PART, TriangleStream, Triangles};
+use crate::topology::{End, MAX_NET, ends};
+use crate::triangles::{Corners, TRIANGLES_PER_PART, Triangle, TriangleStream, Triangles};
 use bytemuck::{Pod, Zeroable};
 use std::cmp::Ordering;
 use std::sync::atomic::AtomicU64;
@@ -54,7 +54,7 @@ impl PartialOrd for Hashed {
 const BITS_PER_HASH: usize = 8;
 
 /// A triangle that shares its hash with another: its corners in a fixed order, then its place in the stream, its id and its [`Turn`].
-pub(crate) type Suspect = [u32; 12];
+pub(crate) type Suspect = [u64; 12];
 /// The words of the corners in a [`Suspect`], and the positions of its place, its id and its turn.
 const CORNERS: std::ops::Range<usize> = 0..9;
 const PLACE: usize = 9;
@@ -63,7 +63,7 @@ const TURN: usize = 11;
 
 /// 1 if a triangle goes around its corners against their fixed order, else 0. Where corners are equal it is 0, because
 /// the triangle goes around them in both ways.
-type Turn = u32;
+type Turn = u64;
 
 /// What [`find`] finds.
 pub(crate) enum Found {
@@ -71,23 +71,25 @@ pub(crate) enum Found {
     Pair([u32; 2]),
     /// A triangle that is kept, how many equal ones have its orientation, itself included, less the number of those
     /// that have the opposite one, which makes other than 1, and the bits of its corners.
-    Net { id: u32, net: i32, corners: [[u32; 3]; 3] },
+    Net { id: u32, net: i32, corners: [End; 3] },
 }
 
-/// Returns the hash of the triangle at a place.
+/// Returns the hash of the triangle at a place. Triangles with the same vertices have the same offsets.
 #[inline]
 pub(crate) fn hashed(corners: &Corners, place: u64) -> Hashed {
-    let hash = xxh3_64(bytemuck::bytes_of(&canonical(corners).0));
-    Hashed([(hash >> 32) as u32, hash as u32, place as u32])
-}
-
-/// Returns the bits of the corners in a fixed order.
-fn canonical(triangle: &Corners) -> ([[u32; 3]; 3], Turn) {
     // Each corner becomes one number: that takes three comparisons, where a sort takes many more instructions.
-    let [mut a, mut b, mut c] = triangle.map(|corner| {
+    let numbers = corners.map(|corner| {
         let [x, y, z] = corner.map(|value| u128::from(value.to_bits()));
         x << 64 | y << 32 | z
     });
+    let corners = canonical(numbers).0.map(|corner| [64, 32, 0].map(|shift| (corner >> shift) as u32));
+    let hash = xxh3_64(bytemuck::bytes_of(&corners));
+    Hashed([(hash >> 32) as u32, hash as u32, place as u32])
+}
+
+/// Returns corners in a fixed order.
+#[inline(always)]
+fn canonical<T: Copy + Ord>([mut a, mut b, mut c]: [T; 3]) -> ([T; 3], Turn) {
     let mut turn = b < a;
     (a, b) = (a.min(b), a.max(b));
     turn ^= c < b;
@@ -95,8 +97,7 @@ fn canonical(triangle: &Corners) -> ([[u32; 3]; 3], Turn) {
     turn ^= b < a;
     (a, b) = (a.min(b), a.max(b));
     turn &= a != b && b != c;
-    let corners = [a, b, c].map(|corner| [(corner >> 64) as u32, (corner >> 32) as u32, corner as u32]);
-    (corners, turn.into())
+    ([a, b, c], turn.into())
 }
 
 /// The triangle that is kept of equal ones, and the net of those seen so far.
@@ -117,7 +118,7 @@ impl Group {
         }
         let [a, b, c] = [0, 3, 6].map(|at| [kept[at], kept[at + 1], kept[at + 2]]);
         let corners = if kept[TURN] == 0 { [a, b, c] } else { [a, c, b] };
-        found(Found::Net { id: kept[ID], net: net as i32, corners })
+        found(Found::Net { id: kept[ID] as u32, net: net as i32, corners })
     }
 }
 
@@ -192,9 +193,9 @@ pub(crate) fn find(
     suspects.visit(|suspect| match &mut last {
         Some(Group { kept, net }) if kept[CORNERS] == suspect[CORNERS] => {
             any = true;
-            set(&mut dropped, suspect[PLACE]);
+            set(&mut dropped, suspect[PLACE] as u32);
             *net += if kept[TURN] == suspect[TURN] { 1 } else { -1 };
-            found(Found::Pair([kept[ID], suspect[ID]]))
+            found(Found::Pair([kept[ID] as u32, suspect[ID] as u32]))
         }
         _ => {
             let next = Group { kept: *suspect, net: 1 };
@@ -213,16 +214,16 @@ fn of_part(stream: &TriangleStream, part: usize, shared: &[u64]) -> Result<Vec<S
         return Ok(Vec::new());
     }
     let triangles = stream.part(part)?;
-    let suspect = |(place, triangle): (usize, &crate::triangles::Triangle)| {
+    let suspect = |(place, triangle): (usize, &Triangle)| {
         if words[place / 64] >> (place % 64) & 1 == 0 {
             return None;
         }
         let mut suspect = [0; 12];
-        let (corners, turn) = canonical(&triangle.corners);
+        let (corners, turn) = canonical(ends(triangle, triangles.exact.get(place)));
         suspect[CORNERS].copy_from_slice(corners.as_flattened());
         suspect[TURN] = turn;
-        suspect[PLACE] = (first + place) as u32;
-        suspect[ID] = triangle.id;
+        suspect[PLACE] = (first + place) as u64;
+        suspect[ID] = triangle.id.into();
         Some(suspect)
     };
     Ok(triangles.iter().enumerate().filter_map(suspect).collect())

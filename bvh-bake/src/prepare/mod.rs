@@ -14,7 +14,8 @@ use crate::storage::resources::Resources;
 use crate::threads;
 use crate::tree::{Aabb, Grid, is_one_brick};
 use crate::triangles::placement::Moved;
-use crate::triangles::{Corners, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
+use crate::triangles::{Corners, Exact, Kept, TRIANGLES_PER_PART, TriangleStream, Triangles, fold};
+use bvh_format::vertex::Vertices;
 use duplicates::{Found, Hashed, Suspect};
 
 /// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
@@ -95,10 +96,16 @@ pub(crate) struct Surveyed {
 }
 
 /// Runs the second pass.
-pub(crate) fn survey(kept: &Kept, measured: &Measured, resources: &Resources) -> Result<Surveyed, BakeError> {
+pub(crate) fn survey(
+    kept: &Kept,
+    measured: &Measured,
+    behind: &Vertices,
+    resources: &Resources,
+) -> Result<Surveyed, BakeError> {
     let tally =
         resources.progress.tally(Step::Bake(Stage::Prepare), SURVEY_WEIGHT, kept.count(), kept.count());
-    let bounds = &measured.bounds;
+    let (bounds, left_out) = (&measured.bounds, behind.left_out.map(f64::from));
+    let most_left_out = left_out.into_iter().fold(0.0, f64::max);
     let centre = [0, 1, 2].map(|a| ((f64::from(bounds.lo(a)) + f64::from(bounds.hi(a))) / 2.0) as f32);
     struct Sum {
         squared: f64,
@@ -112,13 +119,20 @@ pub(crate) fn survey(kept: &Kept, measured: &Measured, resources: &Resources) ->
     };
     let add = |sum: &mut Sum, part: usize| {
         let triangles = kept.part(part)?;
-        for triangle in triangles.iter() {
+        for (place, triangle) in triangles.iter().enumerate() {
             for corner in &triangle.corners {
-                let squared =
-                    (0..3).map(|a| (f64::from(corner[a]) - f64::from(centre[a])).powi(2)).sum::<f64>();
-                sum.squared = sum.squared.max(squared);
+                let away = |a: usize| (f64::from(corner[a]) - f64::from(centre[a])).abs() + left_out[a];
+                sum.squared = sum.squared.max((0..3).map(|a| away(a).powi(2)).sum::<f64>());
             }
-            sum.degenerate += u64::from(is_degenerate(&triangle.corners));
+            let vertices = || {
+                triangles
+                    .exact
+                    .get(place)
+                    .copied()
+                    .unwrap_or_else(|| behind.predicted_triangle(&triangle.corners))
+            };
+            let may_be = !has_area(&triangle.corners, most_left_out);
+            sum.degenerate += u64::from(may_be && is_degenerate(vertices()));
             if let Some(grid) = &mut sum.grid {
                 grid.add(&Aabb::of_triangle(&triangle.corners));
             }
@@ -136,16 +150,26 @@ pub(crate) fn survey(kept: &Kept, measured: &Measured, resources: &Resources) ->
             (a, b) => a.or(b),
         };
     }
-    // Differences of f32 in f64, three squares, two sums and a root each round by at most 2^-53 relative. The factor 1
+    // Differences of f32 in f64, sums with what is left out, three squares, two sums and a root each round by at most 2^-53 relative. The factor 1
     // + 2^-40 covers these, and the next f32 covers the last rounding.
     all.radius = ((squared.sqrt() * (1.0 + 2f64.powi(-40))) as f32).next_up();
     Ok(all)
 }
 
-/// Returns true if the three corners lie on a line. This is decided exactly: each component of the cross product of two
-/// edges is a sum of products of f32 differences, which is a 2-by-2 orientation.
-fn is_degenerate(triangle: &Corners) -> bool {
-    let [a, b, c] = triangle.map(|corner| corner.map(f64::from));
+/// Returns true if the vertices behind these offsets, which are this near along each axis, certainly do not lie on a line.
+fn has_area(corners: &Corners, left_out: f64) -> bool {
+    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+    let [p, q] = [b, c].map(|end| [0, 1, 2].map(|k| end[k] - a[k]));
+    let largest = p.iter().chain(&q).fold(0.0, |most: f64, value| most.max(value.abs())) + 2.0 * left_out;
+    // A component of the cross product changes by at most 8 d E if differences of at most E change by 2 d each, and it is rounded
+    // by less than 2^-50 E^2. Twice that is charged, and 2^-1000 for products that vanish.
+    let charge = largest * (16.0 * left_out + largest * 2f64.powi(-48)) + 2f64.powi(-1000);
+    (0..3).any(|k| (p[k] * q[(k + 1) % 3] - p[(k + 1) % 3] * q[k]).abs() > charge)
+}
+
+/// Returns true if the three vertices lie on a line. This is decided exactly: each component of the cross product of two
+/// edges is a sum of products of differences, which is a 2-by-2 orientation.
+fn is_degenerate([a, b, c]: Exact) -> bool {
     [(0, 1), (1, 2), (2, 0)].into_iter().all(|(x, y)| {
         let point = |p: [f64; 3]| robust::Coord { x: p[x], y: p[y] };
         robust::orient2d(point(a), point(b), point(c)) == 0.0

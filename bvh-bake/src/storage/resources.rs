@@ -1,10 +1,9 @@
 //! Divides the memory budget of a bake or a check among its stages, and provides scratch files for the rest.
 
-use super::{Scratch, Stream};
+use super::Scratch;
 use crate::error::Halt;
 use crate::progress::Progress;
 use crate::threads;
-use bytemuck::Pod;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -196,13 +195,13 @@ impl Resources {
         usize::try_from(records.min(most)).unwrap_or(usize::MAX)
     }
 
-    /// Makes one empty stream for each expected number of records.
-    pub(crate) fn streams<T: Pod>(&self, counts: &[u64]) -> Vec<Stream<T>> {
+    /// Returns how many records of `bytes` bytes a piece of each of several streams has, given how many they expect.
+    pub(crate) fn pieces(&self, counts: &[u64], bytes: usize) -> Vec<usize> {
         let most = match self.buffers {
-            Some(bytes) => bytes / (counts.len().max(1) * size_of::<T>()) as u64,
+            Some(buffer) => buffer / (counts.len().max(1) * bytes) as u64,
             None => u64::MAX,
         };
-        counts.iter().map(|&count| Stream::of_pieces(count.min(most) as usize)).collect()
+        counts.iter().map(|&count| count.min(most) as usize).collect()
     }
 }
 

@@ -4,14 +4,14 @@
 //! hash table, which stays in the cache nearest to the processor, and most edges cancel there. The few that do not are
 //! sorted. Hashes only bring edges together: what is equal is decided by coordinates.
 
-use super::edge::{Edge, End, end};
+use super::edge::{Edge, End, ends};
 use super::max_parts;
 use super::nets::Nets;
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
 use crate::threads;
 use crate::tree::Aabb;
-use crate::triangles::Triangle;
+use crate::triangles::Batch;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The triangles of a run. The components of surfaces that meet along an edge depend on this number.
@@ -29,8 +29,10 @@ pub(super) const NO_PLACE: u32 = u32::MAX;
 /// What the bricks of an object need to know.
 pub(crate) struct Survey {
     pub(super) nets: Nets,
-    /// The boxes of all bricks.
+    /// The boxes of all bricks, around the origin.
     boxes: Vec<Bounds>,
+    /// The origin, if ends are vertices, not offsets.
+    origin: Option<[f64; 3]>,
     /// The most parts that an object may have to get a list of components.
     max_parts: u64,
     /// The number of parts found so far.
@@ -59,10 +61,10 @@ pub(crate) struct BrickTopology {
 
 impl Survey {
     /// Starts an object of `triangles` triangles in bricks of these boxes.
-    pub(crate) fn new(nets: Nets, boxes: &[Aabb], triangles: u64) -> Self {
+    pub(crate) fn new(nets: Nets, boxes: &[Aabb], triangles: u64, origin: Option<[f64; 3]>) -> Self {
         let bounds = |of: &Aabb| [[0, 1, 2].map(|axis| of.lo(axis)), [0, 1, 2].map(|axis| of.hi(axis))];
         let boxes = boxes.iter().map(bounds).collect();
-        Self { nets, boxes, max_parts: max_parts(triangles), parts: AtomicU64::new(0) }
+        Self { nets, boxes, origin, max_parts: max_parts(triangles), parts: AtomicU64::new(0) }
     }
 
     /// Returns whether components are listed, after the last brick.
@@ -75,7 +77,7 @@ impl Survey {
     pub(crate) fn brick(
         &self,
         number: usize,
-        triangles: &[Triangle],
+        triangles: &Batch,
         placed: &[(u32, u32)],
         rest: &[u32],
         spill: &Spill,
@@ -85,7 +87,9 @@ impl Survey {
         let runs = order.chunks(TRIANGLES_PER_RUN).zip(parents.chunks_mut(TRIANGLES_PER_RUN));
         let open = threads::map(runs.enumerate(), |(run, (order, parents))| {
             let first = (run * TRIANGLES_PER_RUN) as u32;
-            run_of_triangles(order.iter().map(|&number| &triangles[number as usize]), parents, first)
+            let ends = order.iter().map(|&number| number as usize);
+            let ends = ends.map(|number| ends_of(triangles, number));
+            run_of_triangles(ends, parents, first)
         });
         let open = open.concat();
         let mut parents = Sets(parents);
@@ -102,7 +106,7 @@ impl Survey {
         let mut part_of = |triangle: u32| of_first[parents.first(triangle) as usize];
         let rest = (placed.len()..order.len()).map(|triangle| part_of(triangle as u32)).collect();
         let (near, all) = (self.near(number), edges.len());
-        edges.retain(|edge| self.nets.any() || near.iter().any(|bounds| contains(bounds, edge)));
+        edges.retain(|edge| self.nets.any() || near.iter().any(|bounds| self.contains(bounds, edge)));
         edges.iter_mut().for_each(|edge| edge.of = part_of(edge.of));
         let mut netted = Vec::new();
         if self.nets.any() {
@@ -131,36 +135,37 @@ impl Survey {
         let others = self.boxes.iter().enumerate().filter(|(other, _)| *other != number);
         others.map(|(_, other)| *other).filter(touches).collect()
     }
+
+    /// Returns whether a box contains the offsets of both ends of an edge.
+    fn contains(&self, [lo, hi]: &Bounds, edge: &Edge) -> bool {
+        edge.ends.iter().all(|end| {
+            (0..3).all(|axis| {
+                let offset = match self.origin {
+                    None => f32::from_bits(end[axis] as u32),
+                    Some(origin) => (f64::from_bits(end[axis]) - origin[axis]) as f32,
+                };
+                lo[axis] <= offset && offset <= hi[axis]
+            })
+        })
+    }
 }
 
-/// Returns whether a box contains both ends of an edge.
-fn contains([lo, hi]: &Bounds, edge: &Edge) -> bool {
-    edge.ends.iter().all(|end| {
-        let corner = end.map(f32::from_bits);
-        (0..3).all(|axis| lo[axis] <= corner[axis] && corner[axis] <= hi[axis])
-    })
+fn ends_of(triangles: &Batch, number: usize) -> [End; 3] {
+    ends(&triangles[number], triangles.exact.get(number))
 }
 
 /// Joins the triangles of a run along their edges and returns the edges that do not cancel. `parents` becomes the sets
 /// of joined triangles, which are numbered from `first`.
-fn run_of_triangles<'a>(
-    triangles: impl Iterator<Item = &'a Triangle>,
-    parents: &mut [u32],
-    first: u32,
-) -> Vec<Edge> {
+fn run_of_triangles(triangles: impl Iterator<Item = [End; 3]>, parents: &mut [u32], first: u32) -> Vec<Edge> {
     let mut table = [NO_EDGE; TABLE];
     let mut edges: Vec<Edge> = Vec::with_capacity(3 * parents.len());
     parents.iter_mut().zip(0..).for_each(|(parent, number)| *parent = number);
     // Reading ahead of the branches below keeps many reads from far memory under way.
-    let read = |triangle: &Triangle| {
-        let ends = triangle.corners.map(end);
-        (ends, ends.map(hash))
-    };
-    let triangles: Vec<_> = triangles.map(read).collect();
+    let triangles: Vec<_> = triangles.map(|ends| (ends, ends.map(hash))).collect();
     for (of, (ends, hashes)) in (0..).zip(&triangles) {
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
             let (start, end) = (ends[from], ends[to]);
-            if start == end {
+            if is_same(&start, &end) {
                 continue;
             }
             // The hash is the same for both directions.
@@ -171,8 +176,8 @@ fn run_of_triangles<'a>(
                     edges.push(Edge { ends: [start, end], count: 1, of });
                     break;
                 };
-                let opposite = found.ends == [end, start];
-                if opposite || found.ends == [start, end] {
+                let opposite = is_same(&found.ends[0], &end) && is_same(&found.ends[1], &start);
+                if opposite || is_same(&found.ends[0], &start) && is_same(&found.ends[1], &end) {
                     found.count += if opposite { -1 } else { 1 };
                     join(parents, found.of, of);
                     break;
@@ -186,11 +191,17 @@ fn run_of_triangles<'a>(
     open.map(|edge| Edge { of: edge.of + first, ..*edge }.sorted()).collect()
 }
 
+/// Returns whether two ends are the same, without the call that compilers make of a comparison of arrays.
+#[inline(always)]
+fn is_same(a: &End, b: &End) -> bool {
+    (a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2]) == 0
+}
+
 /// Returns a hash, whose bits all depend on all coordinates.
 #[inline(always)]
 fn hash([x, y, z]: End) -> u64 {
-    let low = (u64::from(x) << 32 | u64::from(y)) ^ 0x9e37_79b9_7f4a_7c15;
-    let mixed = u128::from(low) * u128::from(u64::from(z) ^ 0xd1b5_4a32_d192_ed03);
+    let low = (x ^ y.rotate_left(32)) ^ 0x9e37_79b9_7f4a_7c15;
+    let mixed = u128::from(low) * u128::from(z ^ 0xd1b5_4a32_d192_ed03);
     (mixed >> 64) as u64 ^ mixed as u64
 }
 

@@ -1,15 +1,19 @@
 //! An edge and how often it is traversed.
 
+use crate::triangles::{Exact, Triangle};
 use bytemuck::{Pod, Zeroable};
 
-/// The bits of a corner's coordinates, none of which is -0.
-pub(super) type End = [u32; 3];
+/// The bits of a vertex, or of the offsets that determine it, none of which is -0.
+pub(crate) type End = [u64; 3];
 
-/// Returns the end of an edge at a corner.
+/// Returns the ends of the edges of a triangle, given its vertices if its offsets do not determine these.
 #[inline(always)]
-pub(super) fn end(corner: [f32; 3]) -> End {
+pub(crate) fn ends(triangle: &Triangle, exact: Option<&Exact>) -> [End; 3] {
     // -0.0 + 0.0 is 0.0; every other number stays as it is.
-    corner.map(|value| (value + 0.0).to_bits())
+    match exact {
+        None => triangle.corners.map(|corner| corner.map(|value| u64::from((value + 0.0).to_bits()))),
+        Some(exact) => exact.map(|corner| corner.map(|value| (value + 0.0).to_bits())),
+    }
 }
 
 /// An edge of triangles that belong together.

@@ -7,7 +7,7 @@ use crate::error::BakeError;
 use crate::storage::external_sort::Sorter;
 use crate::storage::resources::Resources;
 use crate::storage::{Spill, Stream};
-use crate::triangles::Triangle;
+use crate::triangles::Batch;
 use bvh_format::topology::TopologyRecord;
 use zerocopy::FromZeros;
 
@@ -72,7 +72,7 @@ pub(crate) struct ObjectTopology {
 /// Triangles in the pages above the bricks.
 pub(crate) struct Rest<'a> {
     /// The rests of all bricks, brick after brick.
-    pub(crate) triangles: &'a [Triangle],
+    pub(crate) triangles: &'a Batch<'a>,
     /// The place of each of them.
     pub(crate) places: &'a [u32],
 }

@@ -19,6 +19,7 @@ mod joined;
 mod nets;
 
 pub(crate) use brick::{BrickTopology, Survey};
+pub(crate) use edge::{End, ends};
 pub(crate) use joined::{ObjectTopology, Rest, TopologyLists, join};
 pub(crate) use nets::{MAX_NET, Nets};
 

@@ -14,9 +14,9 @@ use super::binary::Tree;
 use super::boxes::{Aabb, Binning, Cost};
 use crate::error::BakeError;
 use crate::progress::Tally;
+use crate::storage::Spill;
 use crate::storage::resources::Resources;
-use crate::storage::{Spill, Stream};
-use crate::triangles::{Grouped, InStream, Triangle, Triangles, distribute, fold};
+use crate::triangles::{BatchStream, Grouped, InStream, Triangle, Triangles, distribute, fold};
 use wide::f32x4;
 
 /// The number of cells of the grid along each axis.
@@ -42,7 +42,7 @@ pub(super) struct Division<'a> {
     pub(super) spill: &'a Spill,
     /// Counts each triangle once, even if it is divided again.
     pub(super) tally: &'a Tally<'a>,
-    pub(super) bricks: Vec<Stream<Triangle>>,
+    pub(super) bricks: Vec<BatchStream>,
     /// A box of the triangles of each brick.
     pub(super) boxes: Vec<Aabb>,
 }
@@ -58,7 +58,7 @@ impl Division<'_> {
         grid: Option<Grid>,
     ) -> Result<Tree<BrickIndex>, BakeError> {
         let Some(grid) = grid.filter(|_| count > self.builder.brick as u64) else {
-            let mut brick = self.resources.streams(&[count]);
+            let mut brick = BatchStream::several(self.resources, &[count], triangles.are_exact());
             distribute(
                 triangles.parts(),
                 |part| Ok(Grouped::new(triangles.part(part)?, 1, |_, _| 0)),
@@ -81,7 +81,7 @@ impl Division<'_> {
         let mut parts =
             Parts { of_cell: vec![0; CELLS_PER_AXIS.pow(3)], counts: Vec::new(), boxes: Vec::new() };
         let tree = split(&mut cells, self.builder, &mut parts, 0);
-        let mut streams = self.resources.streams(&parts.counts);
+        let mut streams = BatchStream::several(self.resources, &parts.counts, triangles.are_exact());
         let make = |part: usize| {
             let group = |_: usize, triangle: &Triangle| {
                 parts.of_cell[grid.cell(Aabb::of_triangle(&triangle.corners).centre())]
@@ -99,11 +99,7 @@ impl Division<'_> {
         })
     }
 
-    fn divide_stream(
-        &mut self,
-        stream: Stream<Triangle>,
-        bounds: &Aabb,
-    ) -> Result<Tree<BrickIndex>, BakeError> {
+    fn divide_stream(&mut self, stream: BatchStream, bounds: &Aabb) -> Result<Tree<BrickIndex>, BakeError> {
         if stream.count() <= self.builder.brick as u64 {
             self.bricks.push(stream);
             self.boxes.push(*bounds);
@@ -115,14 +111,15 @@ impl Division<'_> {
     }
 
     /// Returns the first half of the triangles, and the rest.
-    fn halves(&self, triangles: &impl Triangles, count: u64) -> Result<[Stream<Triangle>; 2], BakeError> {
+    fn halves(&self, triangles: &impl Triangles, count: u64) -> Result<[BatchStream; 2], BakeError> {
         let half = count / 2;
         let mut firsts = vec![0];
         for part in 0..triangles.parts() {
             let length = triangles.part(part)?.len() as u64;
             firsts.push(firsts[part] + length);
         }
-        let mut halves = self.resources.streams(&[half, count - half]);
+        let counts = [half, count - half];
+        let mut halves = BatchStream::several(self.resources, &counts, triangles.are_exact());
         let make = |part: usize| {
             let right = |place: usize, _: &Triangle| u32::from(firsts[part] + place as u64 >= half);
             Ok(Grouped::new(triangles.part(part)?, 2, right))
@@ -279,7 +276,7 @@ mod tests {
     use super::*;
     use crate::progress::{Progress, Step};
     use crate::tree::binary::{Content, NodeIndex};
-    use crate::triangles::Corners;
+    use crate::triangles::{Batch, Corners};
 
     const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, reinsert: false };
 
@@ -302,9 +299,9 @@ mod tests {
         let resources = Resources::unlimited(&progress);
         let tally = progress.tally(Step::Read, 0, 0, 0);
         let spill = resources.scratch.spill();
-        let mut all = Stream::of_pieces(1000);
+        let mut all = BatchStream::empty();
         let triangles = corners.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
-        all.append(&spill, &triangles.collect::<Vec<_>>()).unwrap();
+        all.append(&spill, &Batch::of(triangles.collect::<Vec<_>>())).unwrap();
         all.finish(&spill).unwrap();
         let mut division = Division {
             builder,
@@ -321,8 +318,8 @@ mod tests {
         };
         let top = division.divide_stream(all, &bounds_of(&mut corners.iter())).unwrap();
         for (brick, bounds) in division.bricks.iter().zip(&division.boxes) {
-            for piece in brick.pieces() {
-                let triangles = piece.all().unwrap();
+            for part in brick.parts(1000) {
+                let triangles = brick.part(&part).unwrap();
                 let own = bounds_of(&mut triangles.iter().map(|triangle| &triangle.corners));
                 assert!((0..3).all(|a| bounds.lo(a) <= own.lo(a) && own.hi(a) <= bounds.hi(a)));
             }

@@ -20,10 +20,9 @@ pub(crate) mod turning;
 use crate::error::BakeError;
 use crate::options::Effort;
 use crate::progress::{Stage, Step, Tally, WHOLE};
-use crate::storage::Stream;
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
 use crate::threads;
-use crate::triangles::{Kept, Triangle};
+use crate::triangles::{Batch, BatchStream, Kept, Triangle};
 pub(crate) use binary::Tree;
 pub(crate) use boxes::Aabb;
 use boxes::Reference;
@@ -82,12 +81,12 @@ impl PacketTriangles {
 
 /// The bricks of an object and the tree above them.
 pub(crate) struct Bricks {
-    bricks: Vec<Stream<Triangle>>,
+    bricks: Vec<BatchStream>,
     boxes: Vec<Aabb>,
     top: Tree<BrickIndex>,
     builder: Builder,
     /// The brick whose tree is built, if one is: its number, the tree and its triangles.
-    first: Option<(usize, Tree<PacketTriangles>, Vec<Triangle>)>,
+    first: Option<(usize, Tree<PacketTriangles>, Batch<'static>)>,
 }
 
 impl Bricks {
@@ -126,7 +125,7 @@ impl Bricks {
         // Of equal bricks, the first one is taken.
         let largest = (0..self.bricks.len()).rev().max_by_key(|&number| self.bricks[number].count());
         let number = largest.expect("an object has triangles");
-        let brick = std::mem::replace(&mut self.bricks[number], Stream::of_pieces(1));
+        let brick = std::mem::replace(&mut self.bricks[number], BatchStream::empty());
         let (tree, triangles) = self.builder.tree_of_brick(brick, &trees)?;
         let (_, tree, triangles) = self.first.insert((number, tree, triangles));
         Ok((tree, triangles))
@@ -135,7 +134,7 @@ impl Bricks {
     /// Returns the number of triangles of all bricks.
     fn triangles(&self) -> u64 {
         let first = self.first.as_ref().map_or(0, |(.., triangles)| triangles.len() as u64);
-        first + self.bricks.iter().map(Stream::count).sum::<u64>()
+        first + self.bricks.iter().map(BatchStream::count).sum::<u64>()
     }
 
     /// Builds the tree of each brick, but for the first one, and passes all to `make` with the number of the brick, several
@@ -144,7 +143,7 @@ impl Bricks {
     pub(crate) fn build<T: Send>(
         self,
         resources: &Resources,
-        make: impl Fn(usize, Tree<PacketTriangles>, &[Triangle]) -> Result<T, BakeError> + Sync,
+        make: impl Fn(usize, Tree<PacketTriangles>, &Batch) -> Result<T, BakeError> + Sync,
     ) -> Result<(Vec<T>, Tree<BrickIndex>), BakeError> {
         let triangles = self.triangles();
         let Self { bricks, top, builder, first, .. } = self;
@@ -233,20 +232,20 @@ impl Builder {
     /// Takes the triangles of a brick out of their storage, builds their tree, and puts them in the order of its packets.
     fn tree_of_brick(
         &self,
-        brick: Stream<Triangle>,
+        brick: BatchStream,
         trees: &Tally,
-    ) -> Result<(Tree<PacketTriangles>, Vec<Triangle>), BakeError> {
+    ) -> Result<(Tree<PacketTriangles>, Batch<'static>), BakeError> {
         let triangles = brick.take()?;
         let mut tree = self.tree(&triangles);
         // All later steps go from packet to packet, and would otherwise wait for far memory at each triangle.
-        let mut in_order = Vec::with_capacity(triangles.len());
+        let mut order: Vec<u32> = Vec::with_capacity(triangles.len());
         for packet in tree.leaves_mut() {
-            let first = in_order.len() as u32;
-            in_order.extend(packet.numbers().iter().map(|&number| triangles[number as usize]));
-            *packet = PacketTriangles::new(first..in_order.len() as u32);
+            let first = order.len() as u32;
+            order.extend_from_slice(packet.numbers());
+            *packet = PacketTriangles::new(first..order.len() as u32);
         }
         trees.add(triangles.len() as u64);
-        Ok((tree, in_order))
+        Ok((tree, triangles.at(order.iter().map(|&number| number as usize))))
     }
 
     /// Builds the tree of a brick.

@@ -16,27 +16,30 @@ use crate::triangles::Triangle;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::{PACKET, Packet};
 use bvh_format::page::TightBound;
+use bvh_format::vertex::Vertices;
 
 /// The fixed cost of a treelet, in mean sizes of nodes with two leaves.
 const TREELET_COST: f64 = 1.0;
 
-/// Cuts the tree of a brick into treelets of up to `width` children and fits the first `slabs` slabs of each child. Puts the
-/// triangles of packets in the order of lanes on request.
+/// Cuts the tree of a brick into treelets of up to `width` children and fits the first `slabs` slabs of each child, which contain
+/// the vertices behind the offsets. Puts the triangles of packets in the order of lanes on request.
 pub(crate) fn cut_brick(
     tree: &Tree<PacketTriangles>,
     triangles: &[Triangle],
     width: usize,
     slabs: usize,
+    behind: &Vertices,
     in_order_of_lanes: bool,
 ) -> Arena {
     let leaf = |packet| Child { bound: TightBound::EMPTY, kind: ChildKind::Leaf(packet) };
-    let mut arena = cut(tree, width, leaf);
+    let (mut arena, margins) = (cut(tree, width, leaf), behind.margins());
     threads::change(arena.children_mut(), |_, child| {
         if let ChildKind::Leaf(packet) = &mut child.kind {
             if in_order_of_lanes {
                 *packet = packet.in_order_of_lanes(triangles);
             }
-            child.bound.kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
+            let kdop = packet_of(triangles, packet).kdop(packet.numbers().len(), slabs);
+            child.bound.kdop = if behind.are_sums() { kdop } else { kdop.widened(&margins) };
         }
     });
     arena.join_kdops(slabs);

@@ -15,11 +15,12 @@ use bvh_format::turning::{MAX_TRIANGLES, TurningDirection, TurningSlab};
 type Vector = [f64; 3];
 
 /// Fits the turning slabs of all children of an arena that have at most [`MAX_TRIANGLES`] triangles below.
-pub(crate) fn fit(arena: &mut Arena, triangles: &[Triangle]) {
+pub(crate) fn fit(arena: &mut Arena, triangles: &[Triangle], left_out: [f32; 3]) {
     let largest = largest_patches(arena);
     let arena_read = &*arena;
     let fitted = threads::map(largest, |place| {
-        let mut patches = Patches { arena: arena_read, triangles, packets: Vec::new(), fitted: Vec::new() };
+        let (packets, fitted) = (Vec::new(), Vec::new());
+        let mut patches = Patches { arena: arena_read, triangles, left_out, packets, fitted };
         patches.fit(place);
         patches.fitted
     });
@@ -53,6 +54,8 @@ fn largest_patches(arena: &Arena) -> Vec<usize> {
 struct Patches<'a> {
     arena: &'a Arena,
     triangles: &'a [Triangle],
+    /// How far vertices are from their offsets.
+    left_out: [f32; 3],
     /// The packets of the patch so far, in the order of the tree.
     packets: Vec<Packet>,
     /// The slabs so far, with the places of their children.
@@ -71,7 +74,8 @@ impl Patches<'_> {
             }
             ChildKind::Brick(_) => return [0.0; 3],
         };
-        let slab = TurningSlab::around(TurningDirection::near(normal), &self.packets[first..]);
+        let direction = TurningDirection::near(normal);
+        let slab = TurningSlab::around(direction, &self.packets[first..], self.left_out);
         self.fitted.push((place, slab));
         normal
     }

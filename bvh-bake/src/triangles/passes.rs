@@ -1,11 +1,10 @@
 //! Passes over triangles, part by part: `fold` accumulates them per thread, `distribute` sorts them into streams.
 
-use super::{TRIANGLES_PER_PART, Triangle, Triangles};
+use super::{Batch, BatchStream, TRIANGLES_PER_PART, Triangle, Triangles};
 use crate::error::BakeError;
 use crate::progress::Tally;
-use crate::storage::{Spill, Stream};
+use crate::storage::Spill;
 use crate::threads;
-use std::borrow::Cow;
 use std::ops::Range;
 
 /// Adds each part to an accumulator. Each thread has one accumulator for a run of successive parts; all of them are
@@ -26,7 +25,7 @@ pub(crate) fn fold<A: Send>(
 
 /// The triangles of a part in groups, each in the order of the part. The triangles themselves are not moved.
 pub(crate) struct Grouped<'a> {
-    triangles: Cow<'a, [Triangle]>,
+    triangles: Batch<'a>,
     /// The places of the triangles, group after group; empty if there is only one group.
     places: Vec<u16>,
     /// The position after the last place of each group.
@@ -39,7 +38,7 @@ const _: () = assert!(TRIANGLES_PER_PART <= 1 << 16);
 impl<'a> Grouped<'a> {
     /// Puts each triangle of a part into one of `groups` groups.
     pub(crate) fn new(
-        triangles: Cow<'a, [Triangle]>,
+        triangles: Batch<'a>,
         groups: usize,
         group_of: impl Fn(usize, &Triangle) -> u32,
     ) -> Self {
@@ -64,7 +63,7 @@ impl<'a> Grouped<'a> {
     }
 
     /// Appends the triangles of a group to a stream.
-    fn append_to(&self, group: usize, stream: &mut Stream<Triangle>, spill: &Spill) -> Result<(), BakeError> {
+    fn append_to(&self, group: usize, stream: &mut BatchStream, spill: &Spill) -> Result<(), BakeError> {
         if self.ends.len() == 1 {
             return stream.append(spill, &self.triangles);
         }
@@ -78,7 +77,7 @@ impl<'a> Grouped<'a> {
 pub(crate) fn distribute<'a>(
     parts: usize,
     make: impl Fn(usize) -> Result<Grouped<'a>, BakeError> + Sync,
-    streams: &mut [Stream<Triangle>],
+    streams: &mut [BatchStream],
     spill: &Spill,
     tally: &Tally,
 ) -> Result<(), BakeError> {
@@ -98,12 +97,12 @@ pub(crate) fn distribute<'a>(
 
 /// The triangles of a finished stream.
 pub(crate) struct InStream<'a> {
-    stream: &'a Stream<Triangle>,
+    stream: &'a BatchStream,
     parts: Vec<(usize, Range<usize>)>,
 }
 
 impl<'a> InStream<'a> {
-    pub(crate) fn new(stream: &'a Stream<Triangle>) -> Self {
+    pub(crate) fn new(stream: &'a BatchStream) -> Self {
         Self { stream, parts: stream.parts(TRIANGLES_PER_PART) }
     }
 }
@@ -113,8 +112,11 @@ impl Triangles for InStream<'_> {
         self.parts.len()
     }
 
-    fn part(&self, number: usize) -> Result<Cow<'_, [Triangle]>, BakeError> {
-        let (piece, range) = &self.parts[number];
-        self.stream.pieces()[*piece].range(range.clone())
+    fn part(&self, number: usize) -> Result<Batch<'_>, BakeError> {
+        self.stream.part(&self.parts[number])
+    }
+
+    fn are_exact(&self) -> bool {
+        self.stream.are_exact()
     }
 }

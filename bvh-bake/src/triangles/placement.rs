@@ -1,8 +1,10 @@
-//! Places vertices: turns the coordinates of the input into those of a file, by origin, rounding and the grid of
-//! quantised triangles.
+//! Places vertices: turns the coordinates of the input into the offsets of a file, and moves those that have to move.
 //!
-//! Coordinates become `f32` numbers relative to an `f64` origin, such that `origin + v` is exact in `f64`. The
-//! distance by which a vertex moves is measured, not estimated.
+//! Offsets are `f32` numbers relative to an `f64` origin. The vertices behind them stay as they were given, except where they
+//! are moved to a grid on request, or lie below the least unit of the format. The distance by which a vertex moves is measured,
+//! not estimated.
+
+use bvh_format::vertex::{LEAST_UNIT, NO_FINER, Vertices};
 
 /// The range of the coordinates of an object.
 #[derive(Clone, Copy)]
@@ -18,7 +20,7 @@ impl Extent {
         Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3], all_f32: [true; 3] };
 
     #[inline]
-    pub(crate) fn add(&mut self, position: [f64; 3]) {
+    fn add(&mut self, position: &[f64; 3]) {
         for axis in 0..3 {
             let value = position[axis];
             self.lo[axis] = self.lo[axis].min(value);
@@ -27,16 +29,21 @@ impl Extent {
         }
     }
 
-    /// Adds the corners of a triangle, and returns whether it is a point.
+    /// Adds the corners of a triangle, and returns whether it is a point. Corners become multiples of the least unit.
     #[inline]
-    pub(crate) fn add_triangle(&mut self, corners: &[[f64; 3]; 3]) -> bool {
+    pub(crate) fn add_triangle(&mut self, corners: &mut [[f64; 3]; 3], moved: &mut Moved) -> bool {
+        let mut all_on_unit = true;
+        corners.as_flattened().iter().for_each(|&c| all_on_unit &= (c.abs() >= NO_FINER) | (c == 0.0));
+        if !all_on_unit {
+            move_to_unit(corners, moved);
+        }
         let [a, b, c] = *corners;
-        self.add(a);
+        self.add(&a);
         if a == b && b == c {
             return true;
         }
-        self.add(b);
-        self.add(c);
+        self.add(&b);
+        self.add(&c);
         false
     }
 
@@ -52,14 +59,51 @@ impl Extent {
     pub(crate) fn diagonal(&self) -> f64 {
         (0..3).map(|a| (self.hi[a] - self.lo[a]).powi(2)).sum::<f64>().sqrt()
     }
+
+    /// The middle of an axis, rounded to the spacing of numbers there, if it gains two bits or more to measure from it; else 0.
+    /// Differences of coordinates and the middle are then exact.
+    pub(super) fn middle(&self, axis: usize) -> AxisOrigin {
+        let (lo, hi) = (self.lo[axis], self.hi[axis]);
+        let largest = lo.abs().max(hi.abs());
+        let half = (hi - lo) / 2.0;
+        if largest <= 4.0 * half || self.all_f32[axis] {
+            return AxisOrigin::default();
+        }
+        // `origin + v` stays below twice the largest coordinate, where this is the spacing of `f64` numbers.
+        let grid = spacing(2.0 * largest).max(LEAST_UNIT);
+        let middle = lo + half;
+        AxisOrigin { origin: (middle / grid).round() * grid, grid }
+    }
 }
 
 /// One axis of the origin, and the grid on which `origin + v` is exact.
 #[derive(Clone, Copy, Default)]
-struct AxisOrigin {
-    origin: f64,
-    /// Vertices are multiples of this number; 0 stands for no grid.
+pub(super) struct AxisOrigin {
+    pub(super) origin: f64,
+    /// Vertices that move are multiples of this number; 0 stands for no grid.
     grid: f64,
+}
+
+/// Moves coordinates of a triangle to multiples of the least unit.
+#[cold]
+#[inline(never)]
+fn move_to_unit(corners: &mut [[f64; 3]; 3], moved: &mut Moved) {
+    for value in corners.as_flattened_mut() {
+        let given = std::mem::replace(value, on_unit(*value));
+        if *value != given {
+            // Half a unit along each axis is less than one.
+            moved.rounding = moved.rounding.max(LEAST_UNIT);
+        }
+    }
+}
+
+/// Returns the multiple of the least unit that is nearest to a coordinate, ties to even.
+fn on_unit(coordinate: f64) -> f64 {
+    if coordinate.abs() >= NO_FINER || !coordinate.is_finite() {
+        return coordinate;
+    }
+    // -0.0 + 0.0 is 0.0; every other number stays as it is.
+    (coordinate / LEAST_UNIT).round_ties_even() * LEAST_UNIT + 0.0
 }
 
 /// The largest distances by which vertices moved, in mesh units.
@@ -90,49 +134,63 @@ impl Moved {
 }
 
 /// The way the vertices of an object are placed.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(crate) struct Placement {
-    axes: [AxisOrigin; 3],
-    /// The step of the grid of quantised triangles.
-    step: Option<f64>,
+    behind: Vertices,
+    /// The grids on which sums with the origin are exact, and the step of the grid of quantised triangles.
+    quantized: Option<([f64; 3], f64)>,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self::of(Vertices::around([0.0; 3]))
+    }
 }
 
 impl Placement {
-    /// Chooses the origin. Along an axis it is 0 if every coordinate is an `f32`, or if moving it would gain less
-    /// than two bits. Otherwise it is the middle of the axis, rounded to the spacing of `f64` numbers there.
-    /// `grid_error` is the largest distance by which quantisation may move a vertex, or `None` for no quantisation.
-    pub(crate) fn new(extent: &Extent, grid_error: Option<f64>) -> Self {
-        let axes = [0, 1, 2].map(|axis| {
-            let (lo, hi) = (extent.lo[axis], extent.hi[axis]);
-            let largest = lo.abs().max(hi.abs());
-            let half = (hi - lo) / 2.0;
-            if largest <= 4.0 * half || extent.all_f32[axis] {
-                return AxisOrigin::default();
-            }
-            // `origin + v` stays below twice the largest coordinate, where this is the spacing of `f64` numbers.
-            // Origins are multiples of the smallest `f32`, as all vertices are.
-            let grid = spacing(2.0 * largest).max(f64::from(f32::from_bits(1)));
-            let middle = lo + half;
-            AxisOrigin { origin: (middle / grid).round() * grid, grid }
-        });
-        Self { axes, step: grid_error.map(grid_step) }
+    /// Leaves vertices where they are.
+    pub(crate) fn of(behind: Vertices) -> Self {
+        Self { behind, quantized: None }
     }
 
-    pub(crate) fn origin(&self) -> [f64; 3] {
-        self.axes.map(|axis| axis.origin)
+    /// Moves vertices to a grid, by at most `error`.
+    pub(crate) fn quantized(extent: &Extent, error: f64) -> Self {
+        let axes = [0, 1, 2].map(|axis| extent.middle(axis));
+        let behind = Vertices::around(axes.map(|axis| axis.origin));
+        Self { behind, quantized: Some((axes.map(|axis| axis.grid), grid_step(error))) }
     }
 
-    /// Returns whether `f32` coordinates other than -0.0 stay as they are.
+    /// How vertices follow from offsets.
+    pub(crate) fn behind(&self) -> Vertices {
+        self.behind
+    }
+
+    /// Whether vertices do not follow from offsets alone.
+    pub(crate) fn is_corrected(&self) -> bool {
+        self.behind.are_corrected()
+    }
+
+    /// Returns whether `f32` coordinates stay as they are.
     pub(crate) fn keeps_f32(&self) -> bool {
-        self.step.is_none() && self.axes.iter().all(|axis| axis.origin == 0.0 && axis.grid == 0.0)
+        self.quantized.is_none() && self.behind == Vertices::around([0.0; 3])
     }
 
-    /// Returns the vertex of the file for a vertex of the input, and records in `moved` how far it moved.
+    /// Returns the offsets of a file for a vertex of the input, and records in `moved` how far the vertex moved.
     #[inline]
     pub(crate) fn place(&self, position: [f64; 3], moved: &mut Moved) -> [f32; 3] {
+        let offset = |axis: usize| (position[axis] - self.behind.origin[axis]) as f32;
+        let offsets = match &self.quantized {
+            None => [0, 1, 2].map(offset),
+            Some((grids, step)) => self.snapped(position, grids, *step, moved),
+        };
+        // Equal values must have equal bits.
+        offsets.map(|value| if value == 0.0 { 0.0 } else { value })
+    }
+
+    fn snapped(&self, position: [f64; 3], grids: &[f64; 3], step: f64, moved: &mut Moved) -> [f32; 3] {
         let (mut vertex, mut moves) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
-            let AxisOrigin { origin, grid } = self.axes[axis];
+            let (origin, grid) = (self.behind.origin[axis], grids[axis]);
             let mut offset = position[axis] - origin;
             if grid > 0.0 {
                 offset = (offset / grid).round() * grid;
@@ -141,19 +199,16 @@ impl Placement {
             moves[axis] = position[axis] - (origin + f64::from(vertex[axis]));
         }
         moved.rounding = max_norm(moved.rounding, moves);
-        if let Some(step) = self.step {
-            for axis in 0..3 {
-                let rounded = f64::from(vertex[axis]);
-                // If the step is smaller than the spacing of `f32` at the vertex, the vertex is on the grid already. That
-                // includes a step so small that the quotient overflows.
-                let snapped = ((rounded / step).round() * step) as f32;
-                vertex[axis] = if snapped.is_finite() { snapped } else { vertex[axis] };
-                moves[axis] = f64::from(vertex[axis]) - rounded;
-            }
-            moved.quantization = max_norm(moved.quantization, moves);
+        for axis in 0..3 {
+            let rounded = f64::from(vertex[axis]);
+            // If the step is smaller than the spacing of `f32` at the vertex, the vertex is on the grid already. That
+            // includes a step so small that the quotient overflows.
+            let snapped = ((rounded / step).round() * step) as f32;
+            vertex[axis] = if snapped.is_finite() { snapped } else { vertex[axis] };
+            moves[axis] = f64::from(vertex[axis]) - rounded;
         }
-        // Equal values must have equal bits.
-        vertex.map(|value| if value == 0.0 { 0.0 } else { value })
+        moved.quantization = max_norm(moved.quantization, moves);
+        vertex
     }
 }
 

@@ -3,16 +3,38 @@
 //! Each thread can hold a few parts in memory.
 
 use super::placement::{Moved, Placement};
-use super::{TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
+use super::{Batch, Exact, TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
 use crate::threads;
-use std::borrow::Cow;
+use bvh_format::vertex::Vertices;
 
 /// A part of the input as it was read.
 pub(crate) enum Part {
     Narrow(Piece<Triangle>),
     Wide(Piece<WideTriangle>),
+}
+
+impl Part {
+    /// Returns the number of triangles.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Narrow(piece) => piece.len(),
+            Self::Wide(piece) => piece.len(),
+        }
+    }
+
+    /// Visits all triangles as they were read.
+    pub(crate) fn each_triangle(&self, mut visit: impl FnMut(&Exact)) -> Result<(), BakeError> {
+        match self {
+            Self::Narrow(piece) => {
+                let all = piece.all()?;
+                all.iter().for_each(|triangle| visit(&triangle.corners.map(|corner| corner.map(f64::from))));
+            }
+            Self::Wide(piece) => piece.all()?.iter().for_each(|triangle| visit(&triangle.corners)),
+        }
+        Ok(())
+    }
 }
 
 /// All triangles of an object, duplicates included. All parts but the last are full.
@@ -26,7 +48,8 @@ pub(crate) struct TriangleStream {
 /// An object of the input, ready to be baked.
 pub(crate) struct Gathered {
     pub(crate) name: String,
-    pub(crate) origin: [f64; 3],
+    /// How vertices follow from the offsets of the stream.
+    pub(crate) behind: Vertices,
     pub(crate) stream: TriangleStream,
     /// The largest distances by which vertices moved, as far as they have been measured.
     pub(crate) moved: Moved,
@@ -38,31 +61,39 @@ pub(crate) struct Gathered {
 
 impl TriangleStream {
     /// Returns the triangles of a part, and how far their corners were moved.
-    pub(crate) fn measured_part(&self, number: usize) -> Result<(Cow<'_, [Triangle]>, Moved), BakeError> {
+    pub(crate) fn measured_part(&self, number: usize) -> Result<(Batch<'_>, Moved), BakeError> {
         self.parts[number].measured(self.placement.as_ref())
     }
 }
 
 impl Part {
     /// Returns the triangles, placed if there is a placement, and how far their corners were moved.
-    fn measured(&self, placement: Option<&Placement>) -> Result<(Cow<'_, [Triangle]>, Moved), BakeError> {
+    fn measured(&self, placement: Option<&Placement>) -> Result<(Batch<'_>, Moved), BakeError> {
         let mut moved = Moved::default();
+        let are_exact = placement.is_some_and(Placement::is_corrected);
         let placed = match (self, placement) {
-            (Part::Narrow(piece), None) => piece.all()?,
+            (Part::Narrow(piece), None) => Batch::of(piece.all()?),
             (Part::Narrow(piece), Some(placement)) => {
+                let all = piece.all()?;
                 let place = |triangle: &Triangle| Triangle {
                     corners: triangle.corners.map(|c| placement.place(c.map(f64::from), &mut moved)),
                     id: triangle.id,
                 };
-                Cow::Owned(piece.all()?.iter().map(place).collect())
+                let exact = |triangle: &Triangle| triangle.corners.map(|corner| corner.map(f64::from));
+                let kept = if are_exact { &all[..] } else { &[] };
+                let triangles = all.iter().map(place).collect();
+                Batch { triangles, exact: kept.iter().map(exact).collect::<Vec<Exact>>().into() }
             }
             (Part::Wide(piece), placement) => {
+                let all = piece.all()?;
                 let placement = placement.copied().unwrap_or_default();
                 let place = |triangle: &WideTriangle| Triangle {
                     corners: triangle.corners.map(|corner| placement.place(corner, &mut moved)),
                     id: triangle.id,
                 };
-                Cow::Owned(piece.all()?.iter().map(place).collect())
+                let kept = if are_exact { &all[..] } else { &[] };
+                let triangles = all.iter().map(place).collect();
+                Batch { triangles, exact: kept.iter().map(|t| t.corners).collect::<Vec<Exact>>().into() }
             }
         };
         Ok((placed, moved))
@@ -71,7 +102,8 @@ impl Part {
 
 impl TriangleStream {
     /// Places all corners at once if all triangles are in memory, because otherwise every pass would place them again.
-    /// Returns the stream and how far the corners moved if it placed them.
+    /// Returns the stream and how far the corners moved if it placed them. Triangles whose vertices do not follow from their
+    /// offsets stay as they were read.
     pub(crate) fn placed_in_memory(self, spill: &Spill) -> Result<(Self, Moved), BakeError> {
         let Self { parts, count, placement } = self;
         let is_placed = |part: &Part| placement.is_none() && matches!(part, Part::Narrow(_));
@@ -79,12 +111,13 @@ impl TriangleStream {
             Part::Narrow(piece) => piece.in_memory().is_some(),
             Part::Wide(piece) => piece.in_memory().is_some(),
         };
-        if parts.iter().all(is_placed) || !parts.iter().all(is_in_memory) {
+        let stays = parts.iter().all(is_placed) || !parts.iter().all(is_in_memory);
+        if stays || placement.is_some_and(|placement| placement.is_corrected()) {
             return Ok((Self { parts, count, placement }, Moved::default()));
         }
         let place = |part: Part| {
-            let (triangles, moved) = part.measured(placement.as_ref())?;
-            let triangles = triangles.into_owned();
+            let (batch, moved) = part.measured(placement.as_ref())?;
+            let triangles = batch.triangles.into_owned();
             drop(part);
             Ok((Part::Narrow(spill.put(triangles)?), moved))
         };
@@ -100,8 +133,12 @@ impl Triangles for TriangleStream {
         self.parts.len()
     }
 
-    fn part(&self, number: usize) -> Result<Cow<'_, [Triangle]>, BakeError> {
+    fn part(&self, number: usize) -> Result<Batch<'_>, BakeError> {
         Ok(self.measured_part(number)?.0)
+    }
+
+    fn are_exact(&self) -> bool {
+        self.placement.is_some_and(|placement| placement.is_corrected())
     }
 }
 
@@ -136,13 +173,17 @@ impl Triangles for Kept<'_> {
         self.stream.parts.len()
     }
 
-    fn part(&self, number: usize) -> Result<Cow<'_, [Triangle]>, BakeError> {
+    fn part(&self, number: usize) -> Result<Batch<'_>, BakeError> {
         let all = self.stream.part(number)?;
         if self.counts[number] == all.len() as u64 {
             return Ok(all);
         }
         let first = number * TRIANGLES_PER_PART;
         let is_kept = |place: &usize| self.dropped[(first + place) / 64] >> ((first + place) % 64) & 1 == 0;
-        Ok(Cow::Owned((0..all.len()).filter(is_kept).map(|place| all[place]).collect()))
+        Ok(all.at((0..all.len()).filter(is_kept)))
+    }
+
+    fn are_exact(&self) -> bool {
+        self.stream.are_exact()
     }
 }

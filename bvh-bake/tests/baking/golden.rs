@@ -11,6 +11,7 @@ use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::profile::Profile;
 use bvh_format::{Layout, validate::validate};
 use cbvh_testkit::seal;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// What ends the names of the files that today's baker makes.
@@ -105,6 +106,71 @@ fn points() -> Vec<u8> {
     to_bytes(&cloud, &Options::default().radius(0.05)).unwrap().0
 }
 
+/// Balls of 48 triangles whose coordinates are no `f32` numbers: one for each way in which they follow from offsets.
+fn exact(options: Options) -> Vec<u8> {
+    let (positions, triangles) = cbvh_testkit::ball::ball(48);
+    let given = |change: &dyn Fn(f32, usize, usize) -> f64| {
+        let of_vertex = |(number, position): (usize, &[f64; 3])| {
+            // Without the tiny numbers that stand for 0 in a ball.
+            let value = position.map(|c| if c.abs() < 1e-6 { 0.0 } else { c as f32 });
+            [0, 1, 2].map(|axis| change(value[axis], axis, number))
+        };
+        positions.iter().enumerate().map(of_vertex).collect::<Vec<[f64; 3]>>()
+    };
+    let read = |text: String| -> f64 { text.parse().unwrap() };
+    // Coordinates of all magnitudes, so that no number of digits after the point suits them.
+    let wide = |value: f32, number: usize| value * [1.0, 37.0, 1e-3, 1e4][number % 4];
+    let mut objects = [
+        (
+            "decimals",
+            given(&|v, axis, _| [1_000_000.1, -2_000_000.3, 0.0][axis] + (f64::from(v) * 64.0).round()),
+        ),
+        ("significant", given(&|v, _, number| read(format!("{:.5e}", wide(v, number))))),
+        ("shortest", given(&|v, _, number| read(format!("{:e}", wide(v, number))))),
+        ("scaled", given(&|v, _, _| f64::from(v) * 0.0254)),
+        // Another axis each: `f32` numbers, what computations leave behind, and a predictor that misses a few vertices.
+        (
+            "mixed",
+            given(&|v, axis, number| match axis {
+                0 => v.into(),
+                1 => 1e5 + f64::from(v) / 3.0,
+                _ => {
+                    let missed = if number % 5 == 2 && v != 0.0 { 1000 * number as u64 } else { 0 };
+                    f64::from_bits(read(format!("{:.8e}", wide(v, number))).to_bits() + missed)
+                }
+            }),
+        ),
+        // Vertices that are equal as `f32` numbers, and lie apart.
+        ("twins", given(&|v, _, _| f64::from(v) * 0.7)),
+    ]
+    .map(|(name, positions)| {
+        let object = Mesh::from_triangles(positions, triangles.clone()).objects.remove(0);
+        bvh_bake::mesh::Object { name: name.to_owned(), ..object }
+    });
+    let twins = &mut objects[5];
+    let first = twins.positions.len() as u32;
+    twins.positions.extend_from_within(..);
+    for coordinate in twins.positions[first as usize..].as_flattened_mut() {
+        *coordinate = if *coordinate == 0.0 { 0.0 } else { coordinate.next_up() };
+    }
+    twins.triangles.extend(triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+    for (number, object) in (0..).zip(&mut objects) {
+        object.triangle_ids = (100 * number..).take(object.triangles.len()).collect();
+    }
+    let mesh = Mesh { objects: objects.to_vec(), ..Mesh::default() };
+    to_bytes(&mesh, &options.split_objects(true)).unwrap().0
+}
+
+/// Packed triangles with ids and topology.
+fn exact_packed() -> Vec<u8> {
+    exact(Options::default().profile(Profile::Dop14U8).triangles(TriangleEncoding::Packed))
+}
+
+/// Plain triangles below turning slabs.
+fn exact_f32() -> Vec<u8> {
+    exact(without_topology(Profile::Dop26U8Wide, TriangleEncoding::F32).ids(false))
+}
+
 fn check(name: &str, bytes: Vec<u8>) {
     validate(&bytes).unwrap();
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../testdata");
@@ -123,6 +189,32 @@ fn check(name: &str, bytes: Vec<u8>) {
     );
 }
 
+/// The files of exact vertices have each predictor, and each form of corrections.
+#[test]
+fn exact_vertices_are_stated_in_each_way() {
+    for bytes in [exact_packed(), exact_f32()] {
+        let layout = Layout::read(&bytes).unwrap();
+        let mut found = BTreeSet::new();
+        for object in &layout.objects {
+            let vertices = object.vertices();
+            found.extend(vertices.predictors.map(|predictor| predictor.parts().0));
+            assert_eq!(object.record().max_vertex_rounding.get(), 0.0);
+            assert_eq!(
+                vertices.origin != [0.0; 3],
+                ["decimals", "mixed"].contains(&object.name()),
+                "{vertices:?}"
+            );
+            let corrected = match object.name() {
+                "twins" => [true; 3],
+                "scaled" | "mixed" => [false, true, true],
+                _ => [false; 3],
+            };
+            assert_eq!(vertices.corrected, corrected, "{}: {vertices:?}", object.name());
+        }
+        assert_eq!(found, BTreeSet::from([0, 1, 2, 3, 4]));
+    }
+}
+
 #[test]
 fn the_baker_still_makes_the_frozen_files() {
     check("plain", plain());
@@ -131,4 +223,6 @@ fn the_baker_still_makes_the_frozen_files() {
     check("turning", turning());
     check("topology", topology());
     check("points", points());
+    check("exact", exact_packed());
+    check("exact-f32", exact_f32());
 }

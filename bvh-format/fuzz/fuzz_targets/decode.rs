@@ -4,7 +4,7 @@ use bvh_format::Layout;
 use bvh_format::bounds::{Subtree, check_bounds};
 use bvh_format::decode::decode_child;
 use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
+use bvh_format::leaf::{VertexBlock, decode_packet};
 use bvh_format::page::{Page, check_crossing, check_page};
 use bvh_format::turning::decode_turning;
 use bvh_format::validate::{packets, validate};
@@ -27,8 +27,11 @@ pub fn decode(bytes: &[u8]) {
             let blocks = layout.check_leaf_block(bytes, &page, object).is_ok()
                 && layout.check_id_block(bytes, &page).is_ok();
             let (leaves, ids) = (layout.leaf_block(bytes, header), layout.id_block(bytes, header));
+            let encoding = object.triangle_encoding();
+            let vertices = VertexBlock::new(encoding, object.vertices(), leaves, header.packets.get().into());
             for (packet, triangles) in packets(&page) {
-                let _ = decode_packet(object.triangle_encoding(), leaves, usize::from(packet));
+                let _ = vertices.triangle(usize::from(packet), triangles - 1);
+                let _ = decode_packet(encoding, leaves, usize::from(packet));
                 let _ = decode_id(ids, usize::from(packet), triangles - 1);
             }
             for slot in 0..header.treelets {

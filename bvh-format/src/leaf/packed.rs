@@ -7,17 +7,17 @@
 //! A block whose packets hold points alone has no records: the corners of a packet's lane are all the same vertex, and the
 //! pool has these vertices in the order of packets and lanes.
 //!
-//! Each coordinate in the pool is an offset of a few bits from the block's base. The sum of both stands for a number in
-//! one of three ways, whichever takes the fewest bits on its axis. For an *ordered* coordinate, the sum is the bits of
-//! the `f32`, made monotone (`b ^ ((b >> 31) >>> 1)`). A *binary* or *decimal* coordinate is the sum times a power of 2
-//! or 10: grids and CAD models are multiples of a power of two, and scans are often printed in decimals. All three are
-//! exact.
+//! For each offset, the pool has a difference of a few bits from the block's base. The sum of both stands for a number in
+//! one of three ways, whichever takes the fewest bits on its axis. For an *ordered* offset, the sum is the bits of the
+//! `f32`, made monotone (`b ^ ((b >> 31) >>> 1)`). A *binary* offset is the sum times a power of 2, and a *decimal* one the
+//! sum divided by a power of 10: grids and CAD models are multiples of a power of two, and scans are often printed in
+//! decimals. All three are exact.
 //!
 //! Section 11.2 of `spec/format.md` states the place of each byte.
 
 use super::patterns::{CORNERS, MAX_SLOTS, PATTERNS, RECORD_SLOTS, SLOTS};
 use super::{PACKET, Packet};
-use crate::bits::read_bits;
+use crate::bits::{load_wide, read_bits};
 use crate::ordered::from_ordered;
 use std::ops::Range;
 
@@ -48,9 +48,9 @@ pub(crate) enum Unit {
     Decimal { digits: u8 },
 }
 
-/// 10^-k for k from 0 on, each rounded to nearest.
+/// 10^k for k from 0 on.
 pub(crate) const DECIMALS: [f64; 16] =
-    [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15];
+    [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
 impl Unit {
     /// Reads an axis of a head: two bits that name the kind, and the exponent. `None` stands for a kind or an exponent
@@ -76,21 +76,21 @@ impl Unit {
         }
     }
 
-    /// The size of the unit, unless the integers are ordered bits.
+    /// How many units are a mesh unit, unless the integers are ordered bits.
     #[inline(always)]
-    pub(crate) fn factor(self) -> Option<f64> {
+    pub(crate) fn divisor(self) -> Option<f64> {
         match self {
             Self::Ordered => None,
-            Self::Binary { exponent } => Some(f64::from_bits(((i64::from(exponent) + 1023) as u64) << 52)),
+            Self::Binary { exponent } => Some(f64::from_bits(((1023 - i64::from(exponent)) as u64) << 52)),
             Self::Decimal { digits } => Some(DECIMALS[usize::from(digits) % DECIMALS.len()]),
         }
     }
 }
 
-/// Returns the coordinate that is `integer` units: a product of two `f64`, rounded to `f32`.
+/// Returns the offset that is `integer` units: a quotient of two `f64`, as a parser of decimals finds it, rounded to `f32`.
 #[inline(always)]
-pub(super) fn in_units(integer: i32, unit: f64) -> f32 {
-    (f64::from(integer) * unit) as f32
+pub(super) fn in_units(integer: i32, divisor: f64) -> f32 {
+    (f64::from(integer) / divisor) as f32
 }
 
 /// The head of a packed block.
@@ -102,9 +102,9 @@ pub struct PackedHead {
     pub further: u16,
     /// Bits of a slot: of a place in the pool.
     pub index_bits: u8,
-    /// Bits of an offset, per axis.
+    /// Bits of a difference, per axis.
     pub bits: [u8; 3],
-    /// The number that offsets count from, per axis.
+    /// The number to which differences are added, per axis.
     pub base: [i32; 3],
     /// How the coordinates of each axis are stored, two bits each: 0 ordered, 1 binary, 2 decimal. Bit 6 is set if the packets
     /// hold points alone.
@@ -209,7 +209,9 @@ impl PackedHead {
 
     /// The bytes that a block needs, before zeros fill its last line.
     pub(crate) fn block_bytes(&self) -> usize {
-        self.pool_at as usize + (usize::from(self.vertices) * self.stride()).div_ceil(8) + 8
+        let pool = (usize::from(self.vertices) * self.stride()).div_ceil(8);
+        // A head that was not checked may state anything.
+        (self.pool_at as usize).saturating_add(pool + 8)
     }
 
     /// Reads the record of a packet, and its further slots. Bytes beyond the block read as zero.
@@ -219,7 +221,7 @@ impl PackedHead {
             return Record::of_points(packet);
         }
         let width = self.index_width();
-        let bits = load(block, PACKED_HEAD_BYTES * 8 + packet * self.record_bits());
+        let bits = load_wide(block, PACKED_HEAD_BYTES * 8 + packet * self.record_bits());
         let slots = bits >> RECORD_HEAD_BITS;
         let mut record = Record {
             pattern: bits as u8 & (PATTERNS - 1) as u8,
@@ -230,16 +232,16 @@ impl PackedHead {
             further_words: [0; 2],
         };
         if record.count() > RECORD_SLOTS {
-            let further = load(block, self.further_at as usize * 8 + record.first_further() * width);
+            let further = load_wide(block, self.further_at as usize * 8 + record.first_further() * width);
             record.further_words = [further as u64, (further >> (4 * width)) as u64];
         }
         record
     }
 
-    /// The integer for which an offset stands.
+    /// The integer for which a difference stands.
     #[inline(always)]
-    fn integer(&self, axis: usize, offset: u32) -> i32 {
-        self.base[axis].wrapping_add(offset as i32)
+    fn integer(&self, axis: usize, difference: u32) -> i32 {
+        self.base[axis].wrapping_add(difference as i32)
     }
 
     /// Reads the integers of the vertex in a place of the pool. Bytes beyond the block read as zero.
@@ -248,9 +250,9 @@ impl PackedHead {
         let mut at = self.vertex_at(place);
         [0, 1, 2].map(|axis| {
             let width = u32::from(self.bits[axis].min(32));
-            let offset = read_bits(block, at, width);
+            let difference = read_bits(block, at, width);
             at += width as usize;
-            self.integer(axis, offset)
+            self.integer(axis, difference)
         })
     }
 
@@ -307,10 +309,10 @@ impl PackedHead {
         }
     }
 
-    /// The unit of an axis's integers, or `None` if they are the bits of ordered `f32`.
+    /// The number by which an axis's integers are divided, or `None` if they are the bits of ordered `f32`.
     #[inline(always)]
-    pub fn unit_of(&self, axis: usize) -> Option<f64> {
-        self.unit(axis).and_then(Unit::factor)
+    pub fn divisor_of(&self, axis: usize) -> Option<f64> {
+        self.unit(axis).and_then(Unit::divisor)
     }
 }
 
@@ -430,10 +432,10 @@ pub(super) fn decode(block: &[u8], index: usize) -> Packet {
     for axis in 0..3 {
         // Compilers turn these loops into vector code.
         let mut values = [0.0; 16];
-        match head.unit_of(axis) {
+        match head.divisor_of(axis) {
             None => (0..MAX_SLOTS).for_each(|place| values[place] = from_ordered(integers[axis][place])),
-            Some(unit) => {
-                (0..MAX_SLOTS).for_each(|place| values[place] = in_units(integers[axis][place], unit))
+            Some(divisor) => {
+                (0..MAX_SLOTS).for_each(|place| values[place] = in_units(integers[axis][place], divisor))
             }
         }
         for corner in 0..3 {
@@ -444,6 +446,14 @@ pub(super) fn decode(block: &[u8], index: usize) -> Packet {
         }
     }
     packet
+}
+
+/// Returns the places in the pool of the corners of a triangle.
+#[inline]
+pub(super) fn places_of_lane(block: &[u8], index: usize, lane: usize) -> [usize; 3] {
+    let Some(head) = PackedHead::read(block) else { return [0; 3] };
+    let record = head.record(block, index);
+    record.lane(lane).map(|slot| record.slot(slot.into()) as usize)
 }
 
 /// Reads one triangle of a packet.
@@ -459,33 +469,16 @@ pub(super) fn decode_lane(block: &[u8], index: usize, lane: usize) -> [[f32; 3];
     }
     let mut triangle = [[0.0; 3]; 3];
     for axis in 0..3 {
-        let unit = head.unit_of(axis);
+        let divisor = head.divisor_of(axis);
         for corner in 0..3 {
             let integer = integers[axis][corner];
-            triangle[corner][axis] = match unit {
+            triangle[corner][axis] = match divisor {
                 None => from_ordered(integer),
-                Some(unit) => in_units(integer, unit),
+                Some(divisor) => in_units(integer, divisor),
             };
         }
     }
     triangle
-}
-
-/// Reads at least 121 bits from bit `at` on. Bytes beyond the block read as zero.
-#[inline(always)]
-fn load(block: &[u8], at: usize) -> u128 {
-    let bytes = block.get(at / 8..).unwrap_or(&[]);
-    let word = match bytes.first_chunk() {
-        Some(chunk) => u128::from_le_bytes(*chunk),
-        None => load_tail(bytes),
-    };
-    word >> (at % 8)
-}
-
-/// Reads the last bytes of a block, fewer than sixteen, as a number.
-#[cold]
-fn load_tail(bytes: &[u8]) -> u128 {
-    bytes.iter().rev().fold(0, |word, &byte| word << 8 | u128::from(byte))
 }
 
 /// Reads at least 57 bits from bit `at` on, if the block has all eight bytes of the load.

@@ -11,6 +11,7 @@
 
 use crate::leaf::PACKET;
 use std::collections::HashMap;
+use std::ops::{BitOr, BitXor};
 use std::sync::LazyLock;
 
 /// The number of patterns.
@@ -297,9 +298,12 @@ fn permutations(lanes: usize) -> impl Iterator<Item = [u8; PACKET]> {
 }
 
 /// Gives equal numbers to corners of which all bits are equal: the place of the first such corner, `3 * lane + corner`.
-pub(crate) fn labels_of(triangles: &[[[u32; 3]; 3]; PACKET]) -> Places {
+pub(crate) fn labels_of<T>(triangles: &[[[T; 3]; 3]; PACKET]) -> Places
+where
+    T: Copy + Default + PartialEq + BitOr<Output = T> + BitXor<Output = T>,
+{
     // One array per axis: compilers turn the comparison of one corner with all into vector code.
-    let mut axes = [[0; 16]; 3];
+    let mut axes = [[T::default(); 16]; 3];
     for place in 0..MAX_SLOTS {
         for axis in 0..3 {
             axes[axis][place] = triangles[place / 3][place % 3][axis];
@@ -309,8 +313,9 @@ pub(crate) fn labels_of(triangles: &[[[u32; 3]; 3]; PACKET]) -> Places {
     for place in 0..MAX_SLOTS {
         let mut equal = 0u32;
         for other in 0..MAX_SLOTS {
-            let differs = (0..3).fold(0, |bits, axis| bits | axes[axis][other] ^ axes[axis][place]);
-            equal |= u32::from(differs == 0) << other;
+            let differs =
+                (0..3).fold(T::default(), |bits, axis| bits | axes[axis][other] ^ axes[axis][place]);
+            equal |= u32::from(differs == T::default()) << other;
         }
         labels[place / 3][place % 3] = equal.trailing_zeros() as u8;
     }

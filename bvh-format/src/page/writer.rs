@@ -12,11 +12,12 @@ use crate::checksum::checksum;
 use crate::decode::decode_slabs;
 use crate::ids::{WORD, encode_ids};
 use crate::kdop::Kdop;
-use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, encode_block};
+use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, WidePacket, encode_block};
 use crate::profile::Profile;
 use crate::slabs::NodeSlabs;
 use crate::treelet::{Child, ChildKind, Links, SHORT_TREELET_BYTES, SlabEncoder};
 use crate::turning::{TurningSlab, encode_turning};
+use crate::vertex::Vertices;
 use zerocopy::{FromZeros, IntoBytes};
 
 /// A page and its blocks. Until a [`PagePatcher`](super::PagePatcher) changes its numbers, it is page 0, its blocks are
@@ -55,6 +56,8 @@ pub struct PageWriter {
     /// Remote links written so far.
     remotes: usize,
     packets: Vec<Packet>,
+    /// The vertices behind the packets, if they are corrected.
+    wide: Vec<WidePacket>,
     ids: Vec<LaneIds>,
     open: OpenTreelet,
 }
@@ -115,6 +118,7 @@ impl PageWriter {
             begun: 0,
             remotes: 0,
             packets: Vec::new(),
+            wide: Vec::new(),
             ids: Vec::new(),
             open: OpenTreelet {
                 at: 0,
@@ -193,6 +197,11 @@ impl PageWriter {
         self.ids.push(ids);
     }
 
+    /// States the vertices behind the packet that was added last. Objects whose vertices are corrected need them.
+    pub fn wide_leaf(&mut self, triangles: &[[[f64; 3]; 3]]) {
+        self.wide.push(WidePacket::new(triangles));
+    }
+
     /// Writes the bound and the kind of the next child of the treelet.
     fn child(&mut self, bound: &TightBound, kind: ChildKind) {
         let open = &mut self.open;
@@ -220,8 +229,8 @@ impl PageWriter {
         }
     }
 
-    /// Encodes the blocks and writes the header.
-    pub fn finish(mut self, encoding: TriangleEncoding, with_ids: bool) -> WrittenPage {
+    /// Encodes the blocks and writes the header. `vertices` states how those of the object follow from offsets.
+    pub fn finish(mut self, encoding: TriangleEncoding, vertices: &Vertices, with_ids: bool) -> WrittenPage {
         let short = self.decoded_short.len();
         let treelets = self.decoded.len() + short;
         let written = PageShape { roots: self.shape.roots, remotes: self.remotes, treelets, short };
@@ -239,7 +248,11 @@ impl PageWriter {
         };
         write_header(&mut self.bytes, &header);
         let order = packets_depth_first(&Page::new(&self.bytes, self.profile));
-        let leaf_block = if none { Vec::new() } else { encode_block(encoding, &self.packets, &order) };
+        let leaf_block = if none {
+            Vec::new()
+        } else {
+            encode_block(encoding, &self.packets, &order, vertices, &self.wide)
+        };
         let id_block = if none || !with_ids { Vec::new() } else { encode_ids(&self.ids) };
         header.leaf_checksum = checksum(&leaf_block).into();
         header.id_checksum = if id_block.is_empty() { 0 } else { checksum(&id_block) }.into();
@@ -299,6 +312,7 @@ mod tests {
     use std::ops::Range;
 
     const ENCODING: TriangleEncoding = TriangleEncoding::Packed;
+    const SUMS: Vertices = Vertices::around([0.0; 3]);
     /// Root 1 of page 7 is that of page 5, link 3.
     const PARENT: (u32, u8) = (5, 3);
     const REMOTE: RootRef = RootRef(9 << 6 | 2);
@@ -318,7 +332,7 @@ mod tests {
         let triangles = numbers.clone().map(|number| triangle(number).0);
         let packets: Vec<Packet> = triangles.map(|triangle| Packet::new(&[triangle])).collect();
         let direction = TurningDirection::near([0.25, 0.5, 1.0]);
-        TightBound { kdop: kdop(numbers), turning: Some(TurningSlab::around(direction, &packets)) }
+        TightBound { kdop: kdop(numbers), turning: Some(TurningSlab::around(direction, &packets, [0.0; 3])) }
     }
 
     /// A page of two roots. The first has a packet of four triangles, a treelet and a remote link. That treelet has a packet of one triangle, and so has the second root. The treelet is short in profiles that have such.
@@ -340,7 +354,7 @@ mod tests {
         writer.leaf(&bound(8..9), (8..9).map(triangle));
         writer.begin_treelet();
         writer.leaf(&bound(4..5), (4..5).map(triangle));
-        writer.finish(ENCODING, with_ids)
+        writer.finish(ENCODING, &SUMS, with_ids)
     }
 
     /// An object to which page 7 may belong.
@@ -353,7 +367,8 @@ mod tests {
             profile,
             triangle_encoding: ENCODING,
             f16_scale: 2f32.powi(-12),
-            volumes: Volumes::of(&record),
+            volumes: Volumes::of(&record, &SUMS),
+            vertices: SUMS,
             record,
         }
     }
@@ -475,7 +490,7 @@ mod tests {
         writer.root(&kdop(0..3), None);
         writer.begin_treelet();
         writer.remote(&bound(0..3), REMOTE);
-        let page = writer.finish(ENCODING, true);
+        let page = writer.finish(ENCODING, &SUMS, true);
         assert!(page.leaf_block.is_empty() && page.id_block.is_empty());
     }
 }

@@ -3,10 +3,10 @@
 //! Places ascend, and so do the packets of pages. A cursor goes through the pages once, and skips those between two
 //! places in steps that double, so a short list costs a few pages.
 
-use super::{LANES, Net, ObjectTopology, boundary, visit_list};
+use super::{LANES, Net, ObjectTopology, boundary_of, visit_list};
 use crate::error::ensure;
 use crate::layout::Layout;
-use crate::leaf::decode_triangle;
+use crate::leaf::{VertexBlock, decode_triangle};
 use crate::object::Object;
 use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source};
@@ -32,9 +32,9 @@ pub fn check_in_pages<S: Source + ?Sized>(
     })?;
     let mut pages = Cursor { layout, source, object, held: None };
     visit_list(source, &topology.nets, |at, net: &Net| {
-        let corners = pages.triangle(at, net.place.get())?;
+        let boundary = pages.triangle(at, net.place.get())?;
         let missing = i64::from(net.net.get()) - 1;
-        sum = sum.wrapping_add(boundary(&corners).wrapping_mul(missing as u64));
+        sum = sum.wrapping_add(boundary.wrapping_mul(missing as u64));
         Ok::<_, S::Error>(())
     })?;
     let at = layout.page_offset(object.pages().start);
@@ -62,11 +62,11 @@ struct HeldPage<'a> {
 }
 
 impl<'a, S: Source + ?Sized> Cursor<'a, S> {
-    /// Returns the triangle at a place, which the file states at byte `at`.
+    /// Returns the boundary of the triangle at a place, which the file states at byte `at`.
     ///
     /// # Errors
     /// Rule 46 if there is none, or an error of the source.
-    fn triangle(&mut self, at: u64, place: u32) -> Result<[[f32; 3]; 3], S::Error> {
+    fn triangle(&mut self, at: u64, place: u32) -> Result<u64, S::Error> {
         let (packet, lane) = (u64::from(place) / LANES, u64::from(place) % LANES);
         let page = match self.held.take() {
             Some(held) if packet < held.first_packet + held.triangles.len() as u64 => held,
@@ -81,8 +81,14 @@ impl<'a, S: Source + ?Sized> Cursor<'a, S> {
                 format!("place {place}, of {triangles} triangles in its packet"),
             )
         })?;
-        let encoding = self.object.triangle_encoding;
-        Ok(decode_triangle(encoding, page.block.bytes(), packet, lane as usize))
+        let (encoding, vertices, block) =
+            (self.object.triangle_encoding, &self.object.vertices, page.block.bytes());
+        let offsets = decode_triangle(encoding, block, packet, lane as usize);
+        if !vertices.are_corrected() {
+            return Ok(boundary_of(&offsets, None));
+        }
+        let behind = VertexBlock::new(encoding, vertices, block, page.triangles.len());
+        Ok(boundary_of(&offsets, Some(&behind.behind(packet, lane as usize, offsets))))
     }
 
     /// Returns the last page whose first packet is at most `packet`, from a page on for which this holds.

@@ -14,6 +14,7 @@ use bvh_format::page::{PAGE, PageHeader, PageShape};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::topology::{TopologyRecord, write_topology_head};
 use bvh_format::treelet::{Links, SHORT_TREELET_BYTES};
+use bvh_format::vertex::Vertices;
 use zerocopy::{FromZeros, IntoBytes};
 
 /// Reads a description. After its end, it returns zeros.
@@ -87,7 +88,7 @@ pub fn forge(input: &mut Input) -> Vec<u8> {
         let block = if page.packets.is_empty() {
             Vec::new()
         } else {
-            encode_block(encoding, &page.packets, &in_order)
+            encode_block(encoding, &page.packets, &in_order, &Vertices::around([0.0; 3]), &[])
         };
         let numbers: Vec<Vec<u32>> = page.packets.iter().map(|_| vec![u32::from(input.byte()); 4]).collect();
         let id_block = if has_ids && !numbers.is_empty() { encode_ids(&numbers) } else { Vec::new() };

@@ -12,6 +12,7 @@ use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::{PAGE, Page, PageWriter, RootRef, TightBound};
 use bvh_format::profile::Encoding;
 use bvh_format::treelet::Child;
+use bvh_format::vertex::Vertices;
 use std::collections::BTreeMap;
 use zerocopy::IntoBytes;
 
@@ -137,7 +138,7 @@ pub fn rewritten(
                 }
             }
         }
-        let mut written = writer.finish(object.triangle_encoding(), false).bytes;
+        let mut written = writer.finish(object.triangle_encoding(), &Vertices::around([0.0; 3]), false).bytes;
         written[..64].copy_from_slice(header.as_bytes());
         // Decodes from the roots on, to learn what is decoded for remote children.
         let page = Page::new(&written, profile);

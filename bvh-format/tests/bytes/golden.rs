@@ -326,7 +326,100 @@ fn bad_blocks() -> Vec<(u32, &'static str, Vec<u8>)> {
         (34, "treelets", block(|f| f.record(72, &[9]))),
         (36, "descending", sealed(&[1, 2, 3, 5], |f| pairs(f, [[3, 14], [0, 12]]))),
         (36, "dropped-first", sealed(&[1, 2, 3, 5], |f| pairs(f, [[12, 0], [14, 0]]))),
-        (37, "origin-too-fine", block(|f| f.record(8, &2f64.powi(-149).to_le_bytes()))),
+        // x is predicted, and z is a sum.
+        (37, "left-out-0", block(|f| f.record(168, &[0; 4]))),
+        (37, "origin-too-fine", block(|f| f.record(24, &2f64.powi(-149).to_le_bytes()))),
+    ]
+}
+
+/// Makes a file of one object of `ok-exact.cbvh`, and changes it. The change gets the byte in the leaf section at which the
+/// corrections of its only block start.
+fn exact(number: usize, edit: impl FnOnce(&mut Change, usize)) -> Vec<u8> {
+    let all = take_apart(&std::fs::read(testdata().join("ok-exact.cbvh")).unwrap());
+    let mut record = all[0].2[16 + 192 * number..][..192].to_vec();
+    let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!(word(&record, 84), 1, "pages");
+    let mut page = all[1].2[4096 * word(&record, 80)..][..4096].to_vec();
+    let block = all[2].2[64 * word(&page, 24)..][..64 * word(&page, 48)].to_vec();
+    // The object has no name and no ids, and starts at the first page of the file.
+    put(&mut record, 0, &[0; 8]);
+    put(&mut record, 80, &[0; 4]);
+    put(&mut page, 24, &[0; 16]);
+    put(&mut page, 44, &[0; 4]);
+    put(&mut page, 16, &[0; 8]);
+    put(&mut page, 52, &[0; 4]);
+    let bits: usize = block[5..8].iter().map(|&bits| usize::from(bits)).sum();
+    let vertices = usize::from(u16::from_le_bytes([block[0], block[1]]));
+    let corrections = (word(&block, 28) + (vertices * bits).div_ceil(8) + 8).next_multiple_of(64);
+    let objects = [&[1, 0, 0, 0][..], &[0; 12], &record].concat();
+    let mut file = Change { bytes: put_together(&[(1, 1, objects), (2, 1, page), (3, 1, block)]) };
+    edit(&mut file, corrections);
+    file.seal();
+    file.bytes
+}
+
+/// Changes to predictors and corrections. The object has `f32` numbers on x, corrections of all corners on y, and on z a list
+/// of a few corners.
+fn bad_vertices() -> Vec<(u32, &'static str, Vec<u8>)> {
+    const MIXED: usize = 4;
+    let record = |at: usize, value: &[u8]| exact(MIXED, |f, _| f.record(at, value));
+    let head = |edit: fn(&mut Change, usize)| exact(MIXED, edit);
+    let listed = |f: &Change, at: usize| {
+        let bytes = &f.bytes[section(&f.bytes, 3).start + at..];
+        let corner = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        assert!(bytes[0] == 0 && bytes[8] >= 2, "corrections");
+        [corner(40), corner(42)]
+    };
+    vec![
+        (0, "", head(|_, _| ())),
+        (
+            52,
+            "descending",
+            exact(MIXED, |f, at| {
+                let [first, second] = listed(f, at);
+                f.leaves(at + 40, &[second.to_le_bytes(), first.to_le_bytes()].concat());
+            }),
+        ),
+        (
+            52,
+            "twice",
+            exact(MIXED, |f, at| {
+                let [first, _] = listed(f, at);
+                f.leaves(at + 40, &[first.to_le_bytes(), first.to_le_bytes()].concat());
+            }),
+        ),
+        (
+            52,
+            "corner-beyond",
+            exact(MIXED, |f, at| {
+                let vertices = f.bytes[section(&f.bytes, 3).start];
+                f.leaves(at + 42, &[vertices, 0]);
+            }),
+        ),
+        (52, "more-corners", head(|f, at| f.leaves(at + 8, &[255]))),
+        (52, "of-x", head(|f, at| f.leaves(at, &[1]))),
+        (52, "65-bits", head(|f, at| f.leaves(at + 14, &[65]))),
+        (26, "a-bit-more", head(|f, at| f.leaves(at + 13, &[64]))),
+        (
+            26,
+            "no-corrections",
+            exact(MIXED, |f, at| {
+                let lines = (at / 64) as u8;
+                f.page(48, &[lines, 0, 0, 0]);
+            }),
+        ),
+        (37, "far", head(|f, at| f.leaves(at + 16 + 8 + 7, &[0x20]))),
+        (37, "nan", head(|f, at| f.leaves(at + 16 + 8, &(i64::MAX / 2).to_le_bytes()))),
+        (12, "predictor-5", record(161, &[5])),
+        (12, "digits-of-a-sum", record(164, &[1])),
+        (12, "10-digits", record(166, &[10])),
+        (12, "origin-of-significant", record(24, &1f64.to_le_bytes())),
+        (12, "corrected-8", record(167, &[0xf])),
+        (12, "left-out-of-a-sum", record(168, &1f32.to_le_bytes())),
+        (12, "left-out-negative", record(172, &(-1f32).to_le_bytes())),
+        (12, "scale-without-scaled", record(180, &1f64.to_le_bytes())),
+        (12, "scaled-without-scale", record(161, &[4])),
+        (12, "convex-2", record(188, &[2])),
     ]
 }
 
@@ -410,7 +503,8 @@ fn good_files_are_valid() {
 
 #[test]
 fn bad_files_break_the_rule_in_their_name() {
-    let bad = [bad_at_open(), bad_pages(), bad_blocks(), bad_instances(), bad_topology()].concat();
+    let bad =
+        [bad_at_open(), bad_pages(), bad_blocks(), bad_vertices(), bad_instances(), bad_topology()].concat();
     for (rule, what, bytes) in &bad {
         let found = validate(bytes);
         assert_eq!(number_of(found.clone()), *rule, "{what}: {:?}", found.err());
@@ -442,7 +536,10 @@ fn bad_files_break_the_rule_in_their_name() {
 fn every_flipped_bit_that_means_something_is_found() {
     let topology = std::fs::read(testdata().join("ok-topology.cbvh")).unwrap();
     let points = std::fs::read(testdata().join("ok-points.cbvh")).unwrap();
-    for bytes in [scene(), topology, points] {
+    let exact =
+        ["ok-exact.cbvh", "ok-exact-f32.cbvh"].map(|name| std::fs::read(testdata().join(name)).unwrap());
+    let [packed, plain] = exact;
+    for bytes in [scene(), topology, points, packed, plain] {
         let head = 64 + 32 * bytes[12] as usize;
         let sections: Vec<_> = (1..=8).map(|kind| section(&bytes, kind)).collect();
         for at in (0..bytes.len()).step_by(7) {

@@ -13,17 +13,19 @@ use bvh_format::ids::{ID_ENTRY_BYTES, ID_GROUP, ID_GROUP_HEAD_BITS, WORD, decode
 use bvh_format::instances::{Instance, InstanceRecord, MAX_RIGID_ERROR, MAX_WORLD, write_instances};
 use bvh_format::kdop::{DIRECTIONS, Kdop};
 use bvh_format::leaf::{
-    F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PATTERNS, PackedHead, RECORD_HEAD_BITS,
-    TriangleEncoding, decode_packet,
+    CORRECTIONS_HEAD_BYTES, Corrections, F32_PACKET_BYTES, LINE, PACKED_HEAD_BYTES, PACKET, PATTERNS,
+    PackedHead, RECORD_HEAD_BITS, TriangleEncoding, decode_packet,
 };
 use bvh_format::object::{MAX_COORDINATE, MAX_RADIUS, ObjectRecord, write_objects};
 use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter, TightBound};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};
 use bvh_format::slabs::NodeSlabs;
+use bvh_format::source::MAX_BLOCK_BYTES;
 use bvh_format::topology::{Net, TopologyRecord, write_topology_head};
 use bvh_format::treelet::{Child, Links, SHORT_CODES, SHORT_TREELET_BYTES};
 use bvh_format::turning::{MAX_TRIANGLES, TurningDirection, decode_turning};
+use bvh_format::vertex::{LEAST_UNIT, MAX_DECIMALS, MAX_SIGNIFICANT, Predictor, Vertices};
 use std::any::type_name_of_val;
 use std::mem::offset_of;
 use zerocopy::FromZeros;
@@ -66,7 +68,7 @@ fn byte_table(name: &str, total: usize) -> Vec<(usize, usize, String, String)> {
             None => (row[2].as_str(), 1),
         };
         assert!(
-            ["u8", "u16", "u32", "u64", "i8", "i32", "f32", "f64"].contains(&base),
+            ["u8", "u16", "u32", "u64", "i8", "i32", "i64", "f32", "f64"].contains(&base),
             "{name}: type {base}"
         );
         assert_eq!(offset, next, "{name}: gap or overlap before {}", row[3]);
@@ -103,7 +105,7 @@ fn structures() {
     compare!(ObjectRecord: name_offset, name_length, origin, box_lo, box_hi, triangles, packets, treelets,
         first_page, pages, max_vertex_rounding, max_quantization_error, input_triangles, degenerate,
         duplicates, f16_exponent, profile, triangle_encoding, reserved, sphere_centre, sphere_radius,
-        radius, solid, reserved_end);
+        radius, solid, predictors, digits, corrected, left_out, scale, convex, reserved_end);
     compare!(InstanceRecord: name_offset, name_length, object, member, meets, solid, margin, rotation,
         translation);
     compare!(TopologyRecord: closed, components, nets, reserved);
@@ -151,6 +153,16 @@ fn heads_of_blocks() {
         assert!(kind.contains(&row.2), "type of {name}: {kind} is not {}", row.2);
     }
 
+    let bytes: Vec<u8> = (1..=CORRECTIONS_HEAD_BYTES as u8).collect();
+    let head = Corrections::read(&bytes).unwrap();
+    let rows = byte_table("Corrections", CORRECTIONS_HEAD_BYTES);
+    let fields = [("counts", head.counts[0] as u8), ("bits", head.bits[0]), ("base", head.base[0] as u8)];
+    let named: Vec<_> = rows.iter().filter(|row| row.3 != "reserved").collect();
+    assert_eq!(named.len(), fields.len());
+    for (row, (name, first)) in named.into_iter().zip(fields) {
+        assert_eq!((row.3.as_str(), bytes[row.0]), (name, first));
+    }
+
     // One group of two packets, whose widths are 6 for least ids and 9 for the offsets of the second packet.
     let rows = byte_table("id-entry", ID_ENTRY_BYTES);
     let mut block = vec![0; ID_ENTRY_BYTES];
@@ -191,7 +203,7 @@ fn anchors() {
         writer.root(&slabs, Some((3, 4)));
         writer.begin_treelet();
         writer.leaf(&TightBound::of_kdop(slabs), std::iter::once(([[0.0; 3]; 3], 0)));
-        let page = writer.finish(TriangleEncoding::F32, false).bytes;
+        let page = writer.finish(TriangleEncoding::F32, &Vertices::around([0.0; 3]), false).bytes;
         let anchor = &page[PAGE_HEADER_BYTES..PAGE_HEADER_BYTES + profile.anchor_bytes()];
         let mut next = 0;
         for row in table("format.md", "anchor") {
@@ -247,6 +259,19 @@ fn lists() {
     let encodings = TriangleEncoding::ALL.map(|encoding| format!("{}|{}", encoding as u8, encoding.name()));
     assert_eq!(rows("triangle-encodings", 2), encodings);
 
+    for row in table("format.md", "predictors") {
+        let (least, most) = row[2].split_once(" to ").unwrap_or((&row[2], &row[2]));
+        let (number, stated) = (number(&row[0]) as u8, number(least) as u8..=number(most) as u8);
+        for digits in 0..=u8::MAX {
+            let found = Predictor::from_parts(number, digits);
+            assert_eq!(found.is_some(), stated.contains(&digits), "{}: {digits}", row[1]);
+            let Some(found) = found else { continue };
+            assert!(format!("{found:?}").to_lowercase().starts_with(&row[1]));
+            assert_eq!((found.parts(), found.needs_no_origin()), ((number, digits), row[3] == "0"));
+        }
+    }
+    assert!(Predictor::from_parts(table("format.md", "predictors").len() as u8, 0).is_none());
+
     assert_eq!(table("versions.md", "versions").pop().unwrap()[0], version_name((MAJOR, MINOR)));
 }
 
@@ -261,6 +286,8 @@ fn constants() {
     const LOG2_MAX_WORLD: i32 = 118;
     const LOG2_MAX_RADIUS: i32 = 118;
     const RIGID_BITS: i32 = 23;
+    const LEAST_UNIT_BITS: i32 = 180;
+    assert_eq!(2f64.powi(-LEAST_UNIT_BITS), LEAST_UNIT);
     assert_eq!(2f64.powi(LOG2_MAX_COORDINATE), MAX_COORDINATE);
     assert_eq!(2f64.powi(LOG2_MAX_RADIUS), MAX_RADIUS);
     assert_eq!((2f64.powi(LOG2_MAX_WORLD), 2f64.powi(-RIGID_BITS)), (MAX_WORLD, MAX_RIGID_ERROR));
@@ -279,10 +306,15 @@ fn constants() {
         PACKED_HEAD_BYTES,
         RECORD_HEAD_BITS,
         PATTERNS,
+        CORRECTIONS_HEAD_BYTES,
+        MAX_BLOCK_BYTES,
         ID_GROUP,
         ID_ENTRY_BYTES,
         ID_GROUP_HEAD_BITS,
         LOG2_MAX_COORDINATE,
+        LEAST_UNIT_BITS,
+        MAX_SIGNIFICANT,
+        MAX_DECIMALS,
         TURNING_TRIANGLES,
         LOG2_MAX_WORLD,
         LOG2_MAX_RADIUS,

@@ -225,6 +225,9 @@ cbvh_status cbvh_mesh_rounded(cbvh_mesh mesh, double radius, cbvh_mesh *rounded)
 cbvh_status cbvh_mesh_solid(cbvh_mesh mesh, cbvh_mesh *solid);
 /* Writes the radius of a mesh: 0 if it was given none. */
 cbvh_status cbvh_mesh_radius(cbvh_mesh mesh, double *radius);
+/* Writes how far a vertex may be from the one that was given to the baker, in mesh units: 0 unless vertices were quantised,
+ * rounded or welded on purpose, or lay below 2^-180. Answers are about the mesh as it is stored. */
+cbvh_status cbvh_mesh_max_move(cbvh_mesh mesh, double *max_move);
 /* Writes whether a mesh is solid. */
 cbvh_status cbvh_mesh_is_solid(cbvh_mesh mesh, bool *is_solid);
 

@@ -566,6 +566,12 @@ public:
         check(cbvh_mesh_radius(raw(), &radius));
         return radius;
     }
+    /// How far a vertex may be from the one that was given to the baker: see cbvh_mesh_max_move.
+    double max_move() const {
+        double max_move = 0;
+        check(cbvh_mesh_max_move(raw(), &max_move));
+        return max_move;
+    }
     bool is_solid() const {
         bool is_solid = false;
         check(cbvh_mesh_is_solid(raw(), &is_solid));

@@ -184,6 +184,7 @@ pub unsafe extern "C" fn cbvh_mesh_solid(mesh: MeshHandle, solid: *mut MeshHandl
 about! {
     mesh: MeshHandle, ask;
     one cbvh_mesh_radius() -> radius: f64 = mesh.shape().radius();
+    one cbvh_mesh_max_move() -> max_move: f64 = mesh.shape().max_move();
     one cbvh_mesh_is_solid() -> is_solid: bool = mesh.shape().is_solid();
     one cbvh_mesh_object_count() -> count: usize = mesh.bvh().objects().len();
     one cbvh_mesh_triangle_count() -> count: u64 = mesh.shape().triangles();

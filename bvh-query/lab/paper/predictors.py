@@ -40,7 +40,7 @@ class Tree:
         pages = {number: reader.Page(one, number) for number in one.page_numbers()}
         node_of, self.parent, packets = {(one.first_page, 0): 0}, [-1], {}
         for number, page in pages.items():
-            corners, used = page.triangles().astype(float), page.lanes_used()
+            corners, used = page.offsets().astype(float), page.lanes_used()
             for slot in range(page.treelets):
                 for kind, target in page.targets(slot):
                     node = len(self.parent)

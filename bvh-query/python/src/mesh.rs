@@ -94,6 +94,10 @@ impl Mesh {
         self.shape.shape().radius()
     }
 
+    fn max_move(&self) -> f64 {
+        self.shape.shape().max_move()
+    }
+
     fn is_solid(&self) -> bool {
         self.shape.shape().is_solid()
     }

@@ -32,9 +32,10 @@ use std::sync::Arc;
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
 /// let mut robot = Robot::from_urdf(path, &RobotOptions::default())?;
-/// // Their meshes overlap at the joints.
+/// // Their meshes touch or overlap at the joints.
 /// robot.allow("turret", "upper_arm")?;
 /// robot.allow("upper_arm", "forearm")?;
+/// robot.allow("forearm", "hand")?;
 /// let still = vec![0.0; robot.joints().len()];
 /// let mut bent = still.clone();
 /// bent[1] = 0.4;

@@ -6,7 +6,7 @@ use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::unpack::unpack;
 use crate::isa::Isa;
 use bvh_format::leaf::{
-    F32_PACKET_BYTES, PackedHead, Packet, TriangleEncoding, decode_packet, decode_triangle,
+    F32_PACKET_BYTES, PackedHead, Packet, TriangleEncoding, VertexBlock, decode_packet, decode_triangle,
 };
 use bvh_format::object::Object;
 use bvh_format::page::{PAGE, Page, check_page};
@@ -342,7 +342,26 @@ impl Bvh {
         Ok((packets, triangles))
     }
 
-    /// Returns a triangle of a leaf packet.
+    /// Returns the vertices of a triangle of a leaf packet.
+    pub(crate) fn vertices(
+        &self,
+        object: &Object,
+        leaf: LeafPacket,
+        lane: u8,
+    ) -> Result<[[f64; 3]; 3], QueryError> {
+        let page = self.page(object, leaf.page)?;
+        let block = self.leaf_block(object, &page)?;
+        let (packet, lane) = (usize::from(leaf.packet), usize::from(lane));
+        let offsets = decode_triangle(object.triangle_encoding(), block, packet, lane);
+        let vertices = object.vertices();
+        if vertices.are_sums() {
+            let origin = &vertices.origin;
+            return Ok(offsets.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))));
+        }
+        Ok(behind(object, block, page.header().packets.get().into(), (packet, lane), offsets))
+    }
+
+    /// Returns the offsets of a triangle of a leaf packet.
     pub(crate) fn triangle(
         &self,
         object: &Object,
@@ -393,6 +412,20 @@ impl std::fmt::Debug for OpenFile {
             .field("objects", &self.layout.objects.len())
             .finish()
     }
+}
+
+/// Returns the vertices behind the offsets of a triangle, in a block of some packets, by its packet and lane. Apart from the code
+/// of plain sums, which most objects need.
+#[inline(never)]
+fn behind(
+    object: &Object,
+    block: &[u8],
+    packets: usize,
+    (packet, lane): (usize, usize),
+    offsets: [[f32; 3]; 3],
+) -> [[f64; 3]; 3] {
+    VertexBlock::new(object.triangle_encoding(), object.vertices(), block, packets)
+        .behind(packet, lane, offsets)
 }
 
 /// Returns a packet of plain `f32` in place, if its alignment allows that.

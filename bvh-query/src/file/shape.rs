@@ -95,6 +95,13 @@ impl<'a> Shape<'a> {
         Ok(Self { is_solid: true, ..self })
     }
 
+    /// Returns how far a vertex may be from the one that was given to the baker, in mesh units. Answers are about the mesh as it
+    /// is stored. It is the mesh that was given, and this is 0, unless vertices were quantised, rounded or welded on purpose, or
+    /// lay below 2^-180.
+    pub fn max_move(&self) -> f64 {
+        self.objects().iter().map(Object::max_move).fold(0.0, f64::max)
+    }
+
     /// Returns the radius, in mesh units.
     pub fn radius(&self) -> f64 {
         self.radius

@@ -3,7 +3,7 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
+use bvh_format::leaf::VertexBlock;
 use bvh_format::validate::packets;
 
 impl Shape<'_> {
@@ -19,13 +19,14 @@ impl Shape<'_> {
         let bvh = self.bvh();
         let has_ids = bvh.layout().has_ids();
         for object in self.objects() {
-            let origin = object.origin();
             for number in object.pages() {
                 let page = bvh.page(object, number)?;
                 let (block, ids) = (bvh.leaf_block(object, &page)?, bvh.id_block(&page)?);
                 let first_packet = page.header().first_packet.get();
+                let in_page = page.header().packets.get().into();
+                let vertices =
+                    VertexBlock::new(object.triangle_encoding(), object.vertices(), block, in_page);
                 for (packet, count) in packets(&page) {
-                    let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                     for lane in 0..count {
                         let place = first_packet.wrapping_add(u32::from(packet)).wrapping_mul(4);
                         let id = if has_ids {
@@ -33,8 +34,7 @@ impl Shape<'_> {
                         } else {
                             place.wrapping_add(lane as u32)
                         };
-                        let corner = |v: [f32; 3]| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]));
-                        let corners = values.triangle(lane).map(corner);
+                        let corners = vertices.triangle(packet.into(), lane);
                         visit(id, corners);
                         bvh.duplicates_of(id)?.for_each(|duplicate| visit(duplicate, corners));
                     }

@@ -14,7 +14,7 @@ pub(crate) fn unpack<I: Isa>(isa: I, block: &[u8], index: usize, packet: &mut Pa
     let integers = head.integers(block, &record);
     let places = record.corners();
     for axis in 0..3 {
-        let vertices = isa.coordinates(&integers[axis], head.unit_of(axis));
+        let vertices = isa.coordinates(&integers[axis], head.divisor_of(axis));
         let mut corners = [0.0; 16];
         isa.store(isa.permute(vertices, &places), &mut corners);
         for (corner, lanes) in corners.as_chunks().0.iter().take(3).enumerate() {

@@ -229,8 +229,9 @@ pub(crate) trait Isa: Copy {
     /// Reads 16 little-endian `f32`.
     fn codes_f32(self, from: &[u8; 64]) -> Self::V;
 
-    /// The coordinates for which the integers of a packed leaf block stand: in this unit, or as the bits of ordered `f32`.
-    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Self::V;
+    /// The offsets for which the integers of a packed leaf block stand: divided by this number, or as the bits of ordered
+    /// `f32`.
+    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Self::V;
     /// Lane i is lane `places[i]`, modulo 16, of `value`.
     fn permute(self, value: Self::V, places: &[u8; 16]) -> Self::V;
 

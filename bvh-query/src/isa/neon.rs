@@ -165,13 +165,14 @@ impl Quad for Neon {
         })
     }
     #[inline(always)]
-    fn times_unit(from: &[i32; 4], unit: f64) -> Self {
+    fn divided(from: &[i32; 4], divisor: f64) -> Self {
         let integers = load_integers(Target, from);
         with_features!(Target, {
             let low = vcvtq_f64_s64(vmovl_s32(vget_low_s32(integers)));
             let high = vcvtq_f64_s64(vmovl_high_s32(integers));
-            let low = vcvt_f32_f64(vmulq_n_f64(low, unit));
-            Self(vcvt_high_f32_f64(low, vmulq_n_f64(high, unit)))
+            let divisor = vdupq_n_f64(divisor);
+            let low = vcvt_f32_f64(vdivq_f64(low, divisor));
+            Self(vcvt_high_f32_f64(low, vdivq_f64(high, divisor)))
         })
     }
     #[inline(always)]

@@ -31,7 +31,7 @@ pub(crate) trait Quad: Lanes {
     /// The `f32` for which ordered integers stand.
     fn ordered(from: &[i32; 4]) -> Self;
     /// Integers times a unit, each rounded once.
-    fn times_unit(from: &[i32; 4], unit: f64) -> Self;
+    fn divided(from: &[i32; 4], divisor: f64) -> Self;
     /// The mask of four lanes whose bits are set.
     fn mask(bits: u16) -> Self::Mask;
     /// The masks of sixteen lanes as bits.
@@ -222,15 +222,15 @@ impl<Q: Quad> Isa for Quads<Q> {
         Four(Q::codes_f32(a), Q::codes_f32(b), Q::codes_f32(c), Q::codes_f32(d))
     }
     #[inline(always)]
-    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Four<Q> {
+    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Four<Q> {
         let [a, b, c, d] = quarters(integers);
-        match unit {
+        match divisor {
             None => Four(Q::ordered(a), Q::ordered(b), Q::ordered(c), Q::ordered(d)),
-            Some(unit) => Four(
-                Q::times_unit(a, unit),
-                Q::times_unit(b, unit),
-                Q::times_unit(c, unit),
-                Q::times_unit(d, unit),
+            Some(divisor) => Four(
+                Q::divided(a, divisor),
+                Q::divided(b, divisor),
+                Q::divided(c, divisor),
+                Q::divided(d, divisor),
             ),
         }
     }

@@ -142,11 +142,11 @@ impl Quad for Simd128 {
         Self(v128_xor(integers, u32x4_shr(i32x4_shr(integers, 31), 1)))
     }
     #[inline(always)]
-    fn times_unit(from: &[i32; 4], unit: f64) -> Self {
-        let (integers, unit) = (integers(from), f64x2_splat(unit));
+    fn divided(from: &[i32; 4], divisor: f64) -> Self {
+        let (integers, divisor) = (integers(from), f64x2_splat(divisor));
         let low = f64x2_convert_low_i32x4(integers);
         let high = f64x2_convert_low_i32x4(i64x2_shuffle::<1, 1>(integers, integers));
-        let rounded = |doubles| f32x4_demote_f64x2_zero(f64x2_mul(doubles, unit));
+        let rounded = |doubles| f32x4_demote_f64x2_zero(f64x2_div(doubles, divisor));
         Self(i64x2_shuffle::<0, 2>(rounded(low), rounded(high)))
     }
     #[inline(always)]

@@ -11,6 +11,7 @@ use bvh_format::profile::Profile;
 use bvh_format::slabs::row;
 use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::{SHORT_TREELET_BYTES, child_slabs};
+use bvh_format::vertex::Vertices;
 use cbvh_testkit::Random;
 
 struct Decode<'a> {
@@ -124,7 +125,8 @@ fn every_backend_unpacks_to_the_bits_of_the_reference() {
                 .collect();
             // The last packet comes first.
             let order: Vec<u16> = (0..packets.len() as u16).rev().collect();
-            let block = encode_block(TriangleEncoding::Packed, &packets, &order);
+            let block =
+                encode_block(TriangleEncoding::Packed, &packets, &order, &Vertices::around([0.0; 3]), &[]);
             let mut changed = block.clone();
             for _ in 0..1 + random() % 4 {
                 let at = random() % changed.len();

@@ -19,6 +19,13 @@
 //! below 50u D E^2. The normal of an edge, at most 2 E long, is at most 8 E^3 and is off by less than
 //! (2 (16.2 + 4 + 4) + 8) u E^3, so that the height beyond it is off by less than 3 D (56.4 + 32) u E^3, which is below
 //! 270u D E^3. What underflows is less than 2^-120 in all, as D and E are at most about 2.
+//!
+//! Vertices that are predicted from their offsets are within d of the corners along each axis. Where corners are the same, so are
+//! the vertices, and filters compare the corners with a charge: with E' = E + 2d and D' = D + 2d, a height is a sum of six
+//! products of two edges and a difference, so it changes by at most 6 (E'^2 D' - E^2 D), below 12d E'^2 + 24d E' D'. A height
+//! beyond an edge is a sum of twelve products, one of whose edges may be twice as long, so it changes by less than
+//! 48d E'^3 + 144d E'^2 D'. A third more is charged for roundings. Corrected vertices may differ where corners do not, and are
+//! always compared exactly.
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::frame::scale_of;
@@ -48,7 +55,11 @@ pub(crate) struct SelfPacket {
     edge: [f32; 4],
     /// The place of the object in the shape.
     object: u32,
-    /// Whether the corners are exact.
+    /// How far the vertices are from the corners, at most.
+    left_out: f32,
+    /// Whether filters may compare the corners: scaling has kept them, and those of different vertices differ.
+    is_comparable: bool,
+    /// Whether the corners are the vertices, scaled.
     is_exact: bool,
 }
 
@@ -61,6 +72,12 @@ pub(crate) struct SelfFrame {
     origin_of_shape: [f64; 3],
     /// Units of the frame in a mesh unit, a power of two.
     scale: f32,
+    /// How far vertices are from their offsets, in mesh units.
+    left_out: f64,
+    /// Whether vertices are sums of the origin and their offsets.
+    are_sums: bool,
+    /// Whether vertices with the same offsets may differ.
+    are_corrected: bool,
 }
 
 impl SelfFrame {
@@ -68,7 +85,16 @@ impl SelfFrame {
         let record = object.record();
         let sides = [0, 1, 2].map(|i| f64::from(record.box_hi[i].get()) - f64::from(record.box_lo[i].get()));
         let scale = scale_of(sides.into_iter().fold(0.0, f64::max)) as f32;
-        Self { object: place, origin: object.origin(), origin_of_shape, scale }
+        let vertices = object.vertices();
+        Self {
+            object: place,
+            origin: object.origin(),
+            origin_of_shape,
+            scale,
+            left_out: object.volumes().left_out,
+            are_sums: vertices.are_sums(),
+            are_corrected: vertices.are_corrected(),
+        }
     }
 }
 
@@ -79,6 +105,8 @@ impl SelfPacket {
         normal: [[0.0; 4]; 3],
         edge: [0.0; 4],
         object: 0,
+        left_out: 0.0,
+        is_comparable: false,
         is_exact: false,
     };
 
@@ -96,7 +124,10 @@ impl SelfPacket {
                 isa.store4(scaled, &mut self.corners[corner][axis]);
             }
         }
-        self.is_exact = I::H::bits(lost.le(isa.splat4(0.0))) & 0xf == 0xf;
+        self.is_comparable = I::H::bits(lost.le(isa.splat4(0.0))) & 0xf == 0xf && !frame.are_corrected;
+        self.is_exact = self.is_comparable && frame.are_sums;
+        // Rounded up; far below 1, as the object is about 1 in size.
+        self.left_out = if frame.are_sums { 0.0 } else { (frame.left_out as f32).next_up() * frame.scale };
         self.object = frame.object;
         let [p, q, r] = [0, 1, 2].map(|corner| load4(isa, &self.corners[corner]));
         let (edge_1, edge_2) = (sub(q, p), sub(r, p));
@@ -119,10 +150,16 @@ impl SelfPacket {
         triangle
     }
 
-    /// Returns whether the triangles of both packets are in one unit and around one origin, exactly.
+    /// Returns whether the triangles of both packets are vertices in one unit and around one origin.
     #[inline(always)]
-    pub(crate) fn is_comparable(&self, other: &Self) -> bool {
+    pub(crate) fn are_exact(&self, other: &Self) -> bool {
         self.object == other.object && self.is_exact && other.is_exact
+    }
+
+    /// Returns whether filters may compare both packets.
+    #[inline(always)]
+    fn are_comparable(&self, other: &Self) -> bool {
+        self.object == other.object && self.is_comparable && other.is_comparable
     }
 
     /// The normals of the edges from each corner to the next, in the plane of the face, outward.
@@ -156,6 +193,13 @@ impl SelfPacket {
                     *end = ((origin + f64::from(*end)) - from) as f32;
                 }
             }
+            if !frame.are_sums {
+                // The ends are rounded by half a step, and so is each of these sums.
+                for (lo, hi) in lo.iter_mut().zip(hi.iter_mut()) {
+                    *lo = ((f64::from(*lo) - frame.left_out) as f32).next_down();
+                    *hi = ((f64::from(*hi) + frame.left_out) as f32).next_up();
+                }
+            }
             for place in usize::from(triangles)..PACKET {
                 (lo[place], hi[place]) = (f32::INFINITY, f32::NEG_INFINITY);
             }
@@ -166,7 +210,7 @@ impl SelfPacket {
     #[inline(always)]
     pub(crate) fn undecided<I: Isa>(&self, isa: I, other: &Self, is_same: bool) -> u16 {
         let overlapping = self.boxes.overlapping(isa, &other.boxes) & if is_same { BEFORE } else { u16::MAX };
-        if overlapping == 0 || !self.is_comparable(other) {
+        if overlapping == 0 || !self.are_comparable(other) {
             return overlapping;
         }
         let (apart, common) = apart(isa, self, other);
@@ -202,8 +246,9 @@ fn lanes<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (Corners<I::V>, Corn
 fn apart<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (u16, Common) {
     let (corners_a, corners_b) = lanes(isa, a, b);
     let (edge_a, edge_b) = (isa.repeat(&a.edge), isa.tile(&b.edge));
-    let factor = isa.splat(50.0 * U);
-    let (error_a, error_b) = (edge_a.mul(edge_a).mul(factor), edge_b.mul(edge_b).mul(factor));
+    let left_out = a.left_out;
+    let error = |edge: I::V| HeightError::of_face(isa, edge, left_out);
+    let (error_a, error_b) = (error(edge_a), error(edge_b));
     let (normal_a, normal_b) = (repeat(isa, &a.normal), tile(isa, &b.normal));
     let (mut of_a, mut of_b) = ([Side::default(); 3], [Side::default(); 3]);
     let (mut common, mut once, mut twice) = ([[0; 3]; 3], 0, 0);
@@ -236,9 +281,9 @@ fn beside<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket, common: &Common) -> u1
     let (corners_a, corners_b) = lanes(isa, a, b);
     let (normals_a, normals_b) = (a.edge_normals(isa), b.edge_normals(isa));
     let (edge_a, edge_b) = (isa.repeat(&a.edge), isa.tile(&b.edge));
-    let factor = isa.splat(270.0 * U);
-    let error_a = edge_a.mul(edge_a).mul(edge_a.mul(factor));
-    let error_b = edge_b.mul(edge_b).mul(edge_b.mul(factor));
+    let left_out = a.left_out;
+    let error = |edge: I::V| HeightError::of_edge(isa, edge, left_out);
+    let (error_a, error_b) = (error(edge_a), error(edge_b));
     let (mut beside_a, mut beside_b) = ([u16::MAX; 3], [u16::MAX; 3]);
     for i in 0..3 {
         for j in 0..3 {
@@ -260,10 +305,46 @@ fn beside<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket, common: &Common) -> u1
     beside_a | beside_b
 }
 
+/// The error of a height: a part for each unit of the distance, and a constant part.
+#[derive(Clone, Copy)]
+struct HeightError<V> {
+    per_distance: V,
+    constant: V,
+}
+
+impl<V: Lanes> HeightError<V> {
+    /// Over the plane of a face with edges of this size.
+    #[inline(always)]
+    fn of_face<I: Isa<V = V>>(isa: I, edge: V, left_out: f32) -> Self {
+        let wide = edge.add(isa.splat(2.0 * left_out));
+        let rounding = wide.mul(wide).mul(isa.splat(50.0 * U));
+        let per_distance = wide.mul_add(isa.splat(32.0 * left_out), rounding);
+        let own = wide.mul(wide).mul(isa.splat(16.0 * left_out));
+        Self { per_distance, constant: Self::constant(isa, per_distance, own, left_out) }
+    }
+
+    /// Over the plane through an edge, perpendicular to a face with edges of this size.
+    #[inline(always)]
+    fn of_edge<I: Isa<V = V>>(isa: I, edge: V, left_out: f32) -> Self {
+        let wide = edge.add(isa.splat(2.0 * left_out));
+        let square = wide.mul(wide);
+        let rounding = square.mul(wide.mul(isa.splat(270.0 * U)));
+        let per_distance = square.mul_add(isa.splat(160.0 * left_out), rounding);
+        let own = square.mul(wide).mul(isa.splat(64.0 * left_out));
+        Self { per_distance, constant: Self::constant(isa, per_distance, own, left_out) }
+    }
+
+    /// The distance is that of corners, and that of vertices may be larger.
+    #[inline(always)]
+    fn constant<I: Isa<V = V>>(isa: I, per_distance: V, own: V, left_out: f32) -> V {
+        per_distance.mul_add(isa.splat(2.0 * left_out), own.add(isa.splat(UNDERFLOW)))
+    }
+}
+
 /// Returns the lanes of heights that are certainly above 0, and of those certainly below.
 #[inline(always)]
-fn sides<I: Isa>(isa: I, height: I::V, distance: I::V, error: I::V) -> (u16, u16) {
-    let error = error.mul_add(distance, isa.splat(UNDERFLOW));
+fn sides<I: Isa>(isa: I, height: I::V, distance: I::V, error: HeightError<I::V>) -> (u16, u16) {
+    let error = error.per_distance.mul_add(distance, error.constant);
     let below_error = isa.splat(0.0).sub(error);
     (I::V::bits(error.lt(height)), I::V::bits(height.lt(below_error)))
 }

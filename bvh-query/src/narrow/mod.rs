@@ -5,14 +5,14 @@
 //! the registers of a backend. So the answer is a function of the input numbers alone.
 //!
 //! # Precondition: the range in which nothing under- or overflows
-//! Each coordinate is finite, at most 2^125 in magnitude and a multiple of 2^-266.
+//! Each coordinate is finite, at most 2^125 in magnitude and a multiple of 2^-296.
 //!
 //! `robust` computes signs of determinants with error-free transformations, which are exact as long as no
-//! intermediate result underflows or overflows. A rounded difference of two multiples of 2^-266 is again a
-//! multiple of 2^-266, and so is its rounding error. A product of up to three such numbers is a multiple of
-//! 2^-798, and so is each partial product, rounding error and Dekker half. All of them lie on a grid coarser
+//! intermediate result underflows or overflows. A rounded difference of two multiples of 2^-296 is again a
+//! multiple of 2^-296, and so is its rounding error. A product of up to three such numbers is a multiple of
+//! 2^-888, and so is each partial product, rounding error and Dekker half. All of them lie on a grid coarser
 //! than the smallest subnormal number, 2^-1074, so none is lost. The error bounds are at least 2^-110 times a
-//! nonzero permanent, so they stay above 2^-908. At the upper end, a difference is at most 2^126 and a product
+//! nonzero permanent, so they stay above 2^-998. At the upper end, a difference is at most 2^126 and a product
 //! of three differences at most 2^378, and splitting multiplies by at most 2^27. Outside this range no routine
 //! panics, but the answer is no longer proven.
 

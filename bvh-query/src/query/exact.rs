@@ -55,11 +55,9 @@ impl RecentTriangles {
     }
 }
 
-/// Returns a triangle in the frame of its own file: origin plus stored offset, a sum that is exact.
+/// Returns a triangle in the frame of its own file.
 pub(super) fn stored(bvh: &Bvh, object: &Object, leaf: LeafPacket, lane: u8) -> Result<Triangle, QueryError> {
-    let corners = bvh.triangle(object, leaf, lane & 3)?;
-    let origin = object.origin();
-    Ok(corners.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))))
+    bvh.vertices(object, leaf, lane & 3)
 }
 
 /// Returns the triangle at a place, in the frame of its own file.

@@ -223,12 +223,12 @@ impl PacketVisitor for SelfVisitor<'_> {
         let of = |number| PlacePacket { shape: exact.shape, frames, tree: exact.tree, number };
         let (packet_a, packet_b) = (kept_a.get(isa, of(a))?, kept_b.get(isa, of(b))?);
         let mut mask = packet_a.undecided(isa, packet_b, a == b);
-        let are_comparable = packet_a.is_comparable(packet_b);
+        let are_exact = packet_a.are_exact(packet_b);
         while mask != 0 {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
             let places = [(a, lane / 4), (b, lane % 4)];
-            let flow = if are_comparable {
+            let flow = if are_exact {
                 exact.decide(places, &packet_a.triangle(lane / 4), &packet_b.triangle(lane % 4), budget)?
             } else {
                 exact.decide_stored(places, budget)?

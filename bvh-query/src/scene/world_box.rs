@@ -102,7 +102,7 @@ pub(super) struct Extent {
 
 impl Extent {
     pub(super) fn of(object: &Object) -> Self {
-        let Volumes { origin, box_centre, half_sides, sphere_centre, sphere_radius, magnitude } =
+        let Volumes { origin, box_centre, half_sides, sphere_centre, sphere_radius, magnitude, left_out: _ } =
             *object.volumes();
         let radius = sphere_radius * (1.0 + 1.0 / (1 << 19) as f64);
         Self {

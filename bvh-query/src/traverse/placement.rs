@@ -14,7 +14,7 @@ pub(crate) struct Placement {
     pub(crate) rotation: [[f64; 3]; 3],
     /// R origin_b + t - origin_a.
     pub(crate) translation: [f64; 3],
-    /// Bound on the f64 error of translation and of placed vertices, mesh units.
+    /// Bound on the f64 error of translation and of placed vertices, and on how far these are from their offsets, mesh units.
     pub(crate) error: f64,
 }
 
@@ -29,7 +29,9 @@ impl Placement {
         Self {
             rotation: *pose.rotation(),
             translation: [0, 1, 2].map(|axis| placed[axis] - a.origin[axis]),
-            error: (a.magnitude + b.magnitude + x.abs() + y.abs() + z.abs()) * POSE_ERROR,
+            // A's frame may stretch what B leaves out by 2^-19.
+            error: (a.magnitude + b.magnitude + x.abs() + y.abs() + z.abs()) * POSE_ERROR
+                + (a.left_out + b.left_out * (1.0 + 1.0 / (1 << 18) as f64)),
         }
     }
 

@@ -49,6 +49,11 @@ impl Mesh {
         self.shape.shape().radius()
     }
 
+    #[wasm_bindgen(js_name = maxMove)]
+    pub fn max_move(&self) -> f64 {
+        self.shape.shape().max_move()
+    }
+
     #[wasm_bindgen(js_name = isSolid)]
     pub fn is_solid(&self) -> bool {
         self.shape.shape().is_solid()

@@ -279,6 +279,14 @@ export class Mesh extends Handle<raw.Mesh> {
         return this.#call((mesh) => mesh.radius());
     }
 
+    /**
+     * How far a vertex may be from the one that was given to the baker, in mesh units: 0 unless vertices were quantised, rounded
+     * or welded on purpose, or lay below 2^-180. Answers are about the mesh as it is stored.
+     */
+    get maxMove(): number {
+        return this.#call((mesh) => mesh.maxMove());
+    }
+
     /** Whether what is inside touches the mesh. */
     get isSolid(): boolean {
         return this.#call((mesh) => mesh.isSolid());

@@ -7,7 +7,7 @@ use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeError, BakeReport, Options, input, to_bytes};
 use bvh_format::header::MAGIC;
 use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
+use bvh_format::leaf::VertexBlock;
 use bvh_format::page::Page;
 use bvh_format::validate::packets;
 use bvh_query::{Bvh, Distance, Object, Pose, QueryError, ReadAhead, Shape};
@@ -54,7 +54,10 @@ impl LoadedMesh {
         if object.is_none() {
             refuse_scene(path, &bvh)?;
         }
-        Ok(Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() })
+        let loaded =
+            Self { path: path.to_owned(), bvh, object, build_seconds, check_seconds: OnceLock::new() };
+        point_out_move(path, loaded.shape());
+        Ok(loaded)
     }
 
     /// Checks all pages before queries are timed, and counts that as building: otherwise the first query that touches a
@@ -93,6 +96,14 @@ impl LoadedMesh {
     /// Returns the bytes of the file, and the number of triangles stored in it.
     pub(crate) fn bytes_and_stored(&self) -> (u64, u64) {
         (self.bvh.bytes().len() as u64, self.bvh.all().triangles())
+    }
+}
+
+/// Says that answers are about a mesh as it is stored, if its vertices moved on the way there.
+pub(crate) fn point_out_move(path: &Path, shape: Shape<'_>) {
+    let (path, most) = (path.display(), shape.max_move());
+    if most > 0.0 {
+        tell_line(&format!("{path}: vertices moved by up to {most:e}; answers are about the mesh as stored"));
     }
 }
 
@@ -219,11 +230,24 @@ pub(crate) fn describe([mesh_a, mesh_b]: [&LoadedMesh; 2], answer: &Distance) ->
     let a = name(mesh_a, answer.object_a, answer.triangle_a);
     let b = name(mesh_b, answer.object_b, answer.triangle_b);
     let touch = if *distance == 0.0 { " (the meshes touch)" } else { "" };
+    let given = as_given([mesh_a, mesh_b].map(|mesh| mesh.shape().max_move()), answer);
+    let given =
+        given.map_or(String::new(), |[lower, upper]| format!(", and {lower:?} to {upper:?} as given"));
     format!(
-        "distance {distance:?}{touch}\n  certainly {lower:?} to {upper:?}\n  on A {}, {a}\n  on B {}, {b}\n",
+        "distance {distance:?}{touch}\n  certainly {lower:?} to {upper:?}{given}\n  on A {}, {a}\n  on B {}, {b}\n",
         point(*point_a),
         point(*point_b)
     )
+}
+
+/// Returns bounds of the distance of the meshes that were given, of which vertices moved by at most `moves` before they were
+/// stored; none if no vertex moved.
+fn as_given(moves: [f64; 2], answer: &Distance) -> Option<[f64; 2]> {
+    // A pose may stretch how far B's vertices moved by 2^-19. Sums are rounded outward.
+    let [a, b] = moves;
+    let most = (a + b * (1.0 + 1.0 / (1 << 18) as f64)).next_up();
+    let widened = [(answer.lower - most).next_down().max(0.0), (answer.upper + most).next_up()];
+    (a > 0.0 || b > 0.0).then_some(widened)
 }
 
 /// Returns both triangles as faces, and the segment between the closest points as a line, all in the frame of A.
@@ -284,9 +308,10 @@ pub(crate) fn triangles<'a>(
         let page = Page::new(page, object.profile());
         let header = *page.header();
         let (block, ids) = (layout.leaf_block(bytes, &header), layout.id_block(bytes, &header));
+        let in_page = header.packets.get().into();
+        let vertices = VertexBlock::new(object.triangle_encoding(), object.vertices(), block, in_page);
         let packets: Vec<(u16, usize)> = packets(&page).collect();
         packets.into_iter().flat_map(move |(packet, count)| {
-            let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
             (0..count).map(move |lane| {
                 let id = if layout.has_ids() {
                     decode_id(ids, usize::from(packet), lane)
@@ -294,8 +319,7 @@ pub(crate) fn triangles<'a>(
                     let packet = header.first_packet.get().wrapping_add(u32::from(packet));
                     packet.wrapping_mul(4).wrapping_add(lane as u32)
                 };
-                let place = |corner: [f32; 3]| [0, 1, 2].map(|a| object.origin()[a] + f64::from(corner[a]));
-                (id, values.triangle(lane).map(place))
+                (id, vertices.triangle(packet.into(), lane))
             })
         })
     })

@@ -2,7 +2,7 @@
 
 use super::ClashArguments;
 use crate::asking::files::{POSE_NUMBERS, each_json_line, files_below, require_regular, stem};
-use crate::asking::mesh::{bake_in_memory, is_baked, read_mesh, told, triangles_of};
+use crate::asking::mesh::{bake_in_memory, is_baked, point_out_move, read_mesh, told, triangles_of};
 use crate::console::{Failure, names};
 use crate::process;
 use bvh_bake::input::{MeshFormat, read_scene};
@@ -230,6 +230,7 @@ fn without_extension(path: &Path) -> String {
 fn read_file(path: &Path, files: &Files, splits: bool, options: &Options) -> Result<Vec<Part>, Failure> {
     if is_baked(path)? {
         let bvh = process::map(path, ReadAhead::Usual)?;
+        point_out_move(path, bvh.all());
         if !bvh.layout().has_topology() {
             return Err(Failure::invalid(path, QueryError::NoTopology));
         }
@@ -254,6 +255,7 @@ fn read_file(path: &Path, files: &Files, splits: bool, options: &Options) -> Res
         mesh.objects.iter_mut().for_each(|object| object.name.clear());
     }
     let (bvh, _) = bake_in_memory(path, &mesh, options)?;
+    point_out_move(path, bvh.all());
     parts_of(path, &bvh, |number| open_object(&bvh, number))
 }
 

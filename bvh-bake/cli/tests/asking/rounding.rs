@@ -36,21 +36,24 @@ fn all_commands_that_read_meshes_take_equal_numbers_for_equal() {
         format!("mesh a a.obj\nmesh b b.obj\ninstance a a {IDENTITY}\ninstance b b {IDENTITY}\n"),
     );
     let asked = [
-        ("query a.obj b.obj poses.txt --mode collide", "0\n", "1\n"),
-        ("probe a.obj points.txt --mode side", "-1\n", "0\n"),
-        ("scene x.scene --mode pairs", "0\n", "1\n"),
+        ("query a.obj b.obj poses.txt --mode collide", "0\n", "1\n", 2),
+        ("probe a.obj points.txt --mode side", "-1\n", "0\n", 1),
+        ("scene x.scene --mode pairs", "0\n", "1\n", 2),
     ];
-    for (command, apart, together) in asked {
+    for (command, apart, together, meshes) in asked {
         assert_eq!(directory.cbvh(command).done().out, apart, "{command}");
         assert_eq!(directory.cbvh(&format!("{command} --round none")).done().out, apart, "{command}");
-        assert_eq!(directory.cbvh(&format!("{command} --round f32")).done().out, together, "{command}");
+        let rounded = directory.cbvh(&format!("{command} --round f32")).done_as_stored(meshes);
+        assert_eq!(rounded.out, together, "{command}");
     }
-    let motion = |more| directory.cbvh(&format!("motion a.obj b.obj motions.txt --json{more}")).done().json();
-    assert_eq!([motion(""), motion(" --round f32")].map(|found| found["answer"].clone()), ["free", "hit"]);
-    let clashes = |more| directory.cbvh(&format!("clash a.obj b.obj --json{more}")).done().json();
+    let motion = |more| directory.cbvh(&format!("motion a.obj b.obj motions.txt --json{more}"));
+    let found = [motion("").done(), motion(" --round f32").done_as_stored(2)];
+    assert_eq!(found.map(|found| found.json()["answer"].clone()), ["free", "hit"]);
+    let clashes = |more| directory.cbvh(&format!("clash a.obj b.obj --json{more}"));
     let classes =
         |found: Value| found["clashes"].as_array().unwrap().iter().map(|one| one["class"].clone()).collect();
-    let [plain, rounded]: [Vec<Value>; 2] = [clashes(""), clashes(" --round f32")].map(classes);
+    let found = [clashes("").done(), clashes(" --round f32").done_as_stored(2)];
+    let [plain, rounded]: [Vec<Value>; 2] = found.map(|found| classes(found.json()));
     assert_eq!((plain.len(), rounded), (0, vec![Value::from("touching")]));
     for wrong in ["query a.obj b.obj poses.txt", "clash a.obj b.obj", "bake a.obj -o a.cbvh"] {
         directory.cbvh(&format!("{wrong} --round f16")).failed(1, &["--round", "expected none or f32"]);

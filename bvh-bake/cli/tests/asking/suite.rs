@@ -98,8 +98,8 @@ fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
     let refused = [
         json!({"mesh": "broken", "vertices": [["nan", 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [["-inf", 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
-        // 1e9 and 0.1 have no common grid of single precision.
-        json!({"mesh": "broken", "vertices": [[0.1, 0, 0], [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [[0, 1, 2]]}),
+        // The unit of a file, 2^-240, is larger than 1e-80.
+        json!({"mesh": "broken", "vertices": [[1e-80, 0, 0], [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [[0, 0, 0]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [], "triangles": []}),
         asked(1, "collide", "broken", at(0.0, 0.0, 0.0)),

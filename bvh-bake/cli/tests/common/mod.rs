@@ -114,6 +114,16 @@ impl Ended {
         self
     }
 
+    /// Asserts that the command succeeded and said of this many meshes that answers are about them as they are stored.
+    #[track_caller]
+    pub(crate) fn done_as_stored(self, meshes: usize) -> Self {
+        let lines: Vec<&str> = self.err.lines().collect();
+        let say_so =
+            lines.iter().all(|line| line.contains("vertices moved by up to") && line.ends_with("as stored"));
+        assert!(self.code == 0 && lines.len() == meshes && say_so, "{self:?}");
+        self
+    }
+
     /// Asserts that the command failed with this exit code and one line that contains all of `words`.
     #[track_caller]
     pub(crate) fn failed(self, code: i32, words: &[&str]) -> Self {

@@ -6,7 +6,7 @@
 
 use super::input::{Input, InputCorners};
 use super::surfaces::Surfaces;
-use super::{File, Stored, VerifyError, distance, place, tolerance};
+use super::{File, Stored, VerifyError, distance, tolerance};
 use crate::storage::Spill;
 use crate::storage::external_sort::{Ahead, Sorted, Sorter};
 use crate::storage::resources::Resources;
@@ -32,16 +32,17 @@ struct Claim {
     kept: u32,
     /// The place of the stored triangle in its object.
     place: u32,
+    spare: u32,
     /// The bits of the stored corners.
-    corners: [[u32; 3]; 3],
+    corners: [[u64; 3]; 3],
 }
 
 impl Claim {
     fn of_stored(number: u32, triangle: &Stored, id: u32) -> Self {
         // A packet has four lanes.
         let leaf = [number, triangle.page, u32::from(triangle.packet) << 2 | triangle.lane as u32];
-        let corners = triangle.corners.map(|corner| corner.map(f32::to_bits));
-        Self { id, leaf, turn: 0, kept: id, place: triangle.place, corners }
+        let corners = triangle.corners.map(|corner| corner.map(f64::to_bits));
+        Self { id, leaf, turn: 0, kept: id, place: triangle.place, spare: 0, corners }
     }
 
     /// Returns the stored triangle.
@@ -53,7 +54,7 @@ impl Claim {
             packet: (lane >> 2) as u16,
             lane: (lane & 3) as usize,
             id: Some(self.kept),
-            corners: self.corners.map(|corner| corner.map(f32::from_bits)),
+            corners: self.corners.map(|corner| corner.map(f64::from_bits)),
         }
     }
 
@@ -256,9 +257,8 @@ fn check_corner(
     id: u32,
     corner: usize,
     expected: [f64; 3],
-    stored: [f32; 3],
+    found: [f64; 3],
 ) -> Result<f64, VerifyError> {
-    let found = place(object, stored);
     let moved = distance(expected, found);
     let limit = tolerance(object);
     // Written such that a NaN fails.
@@ -284,7 +284,7 @@ fn check_duplicate(
 ) -> Result<(f64, i32), VerifyError> {
     // The first three keep the orientation.
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
-    let stored = kept.corners.map(|corner| place(object, corner));
+    let stored = kept.corners;
     let moved =
         |order: &[usize; 3]| (0..3).map(|i| distance(corners[i], stored[order[i]])).fold(0.0, f64::max);
     let [same, opposite] =

@@ -4,23 +4,25 @@
 
 use super::input::{Input, InputCorners};
 use super::surfaces::Surfaces;
-use super::{File, VerifyError, distance, place, source_of, tolerance};
+use super::{File, VerifyError, distance, source_of, tolerance};
 use crate::storage::external_sort::{Ahead, Sorter};
 use crate::storage::resources::Resources;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::Object;
 use bvh_format::source::Source;
+use bvh_format::vertex::LEAST_UNIT;
 use bytemuck::{Pod, Zeroable};
 
 /// The bits of the corners in ascending order: equal triangles have the same key, whatever the order of their
 /// corners.
-type Key = [[u32; 3]; 3];
+type Key = [[u64; 3]; 3];
 
 /// A triangle with the number of its object in the file.
 #[derive(Clone, Copy, Pod, Zeroable, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(C)]
 struct Keyed {
     object: u32,
+    spare: u32,
     key: Key,
     /// 1 if the triangle goes around its corners in the order of the key, -1 if against it. 1 where corners are equal.
     way: i32,
@@ -29,13 +31,13 @@ struct Keyed {
 }
 
 impl Keyed {
-    fn new(object: u32, corners: &[[f32; 3]; 3], place: u32) -> Self {
-        let bits = corners.map(|corner| corner.map(f32::to_bits));
+    fn new(object: u32, corners: &[[f64; 3]; 3], place: u32) -> Self {
+        let bits = corners.map(|corner| corner.map(f64::to_bits));
         let mut key = bits;
         key.sort_unstable();
         let [a, b, c] = key;
         let along = [[a, b, c], [b, c, a], [c, a, b]].contains(&bits);
-        Self { object, key, way: if along { 1 } else { -1 }, place }
+        Self { object, spare: 0, key, way: if along { 1 } else { -1 }, place }
     }
 
     /// Returns whether another triangle has the same corners and is of the same object.
@@ -64,7 +66,7 @@ where
         for (number, object) in (0..).zip(&layout.objects) {
             self.each_triangle(object, |triangle| {
                 let keyed = Keyed::new(number, &triangle.corners, triangle.place);
-                roundings[number as usize].add_stored(&keyed.key);
+                roundings[number as usize].add_stored(&triangle.corners);
                 Ok(stored.extend(&[keyed], &spill)?)
             })?;
         }
@@ -95,11 +97,11 @@ where
         let (stored, expected) = (stored.finish(), expected.finish());
         let (mut stored, mut expected) = (Ahead::of(&stored)?, Ahead::of(&expected)?);
         let mut duplicates = 0;
-        for (number, object) in layout.objects.iter().enumerate() {
+        for number in 0..layout.objects.len() {
             if let Some((_, error)) = first.take_if(|((at, ..), _)| *at == number) {
                 return Err(error);
             }
-            duplicates += compare_sorted(object, number as u32, &mut expected, &mut stored, surfaces)?;
+            duplicates += compare_sorted(number as u32, &mut expected, &mut stored, surfaces)?;
         }
         Ok((max_move, duplicates))
     }
@@ -110,11 +112,11 @@ fn check_moves(
     object: &Object,
     id: u32,
     corners: &InputCorners,
-    rounded: &[[f32; 3]; 3],
+    rounded: &[[f64; 3]; 3],
 ) -> Result<f64, VerifyError> {
     let mut max_move = 0.0f64;
     for corner in 0..3 {
-        let moved = distance(corners[corner], place(object, rounded[corner]));
+        let moved = distance(corners[corner], rounded[corner]);
         let limit = tolerance(object);
         if moved.is_nan() || moved > limit {
             let what = format!("triangle {id}, corner {corner}");
@@ -143,14 +145,13 @@ fn next_distinct_of(keys: &mut Ahead<Keyed>, object: u32) -> Result<(Option<Keye
 
 /// Compares the triangles of an object, and returns the number of duplicates.
 fn compare_sorted(
-    object: &Object,
     number: u32,
     expected: &mut Ahead<Keyed>,
     stored: &mut Ahead<Keyed>,
     surfaces: &mut Surfaces,
 ) -> Result<u64, VerifyError> {
     let place = |keyed: Option<Keyed>| match keyed {
-        Some(keyed) => format!("{:?}", keyed.key.map(|corner| place(object, corner.map(f32::from_bits)))),
+        Some(keyed) => format!("{:?}", keyed.key.map(|corner| corner.map(f64::from_bits))),
         None => "no more".to_owned(),
     };
     let mut duplicates = 0;
@@ -161,7 +162,7 @@ fn compare_sorted(
             (None, None) => break,
             (Some(wanted), Some(found)) if wanted.equals(&found) => {
                 duplicates += count - 1;
-                let [a, b, c] = found.key.map(|corner| corner.map(f32::from_bits));
+                let [a, b, c] = found.key.map(|corner| corner.map(f64::from_bits));
                 let corners = if found.way == 1 { [a, b, c] } else { [b, a, c] };
                 surfaces.add(number, &corners, 1)?;
                 if count > 1 {
@@ -182,6 +183,8 @@ struct Rounding {
     origin: [f64; 3],
     /// Whether the baker may have put vertices on a grid.
     quantized: bool,
+    /// Whether it has rounded coordinates to `f32`: they moved by more than the least unit.
+    rounded: bool,
     /// The lowest bit set in any stored coordinate, per axis.
     lowest: [Option<i32>; 3],
     /// The largest magnitude of the mesh's coordinates, per axis.
@@ -197,6 +200,7 @@ impl Rounding {
         Self {
             origin: object.origin(),
             quantized: object.triangle_encoding() == TriangleEncoding::Quantized,
+            rounded: object.record().max_vertex_rounding.get() > LEAST_UNIT,
             lowest: [None; 3],
             largest: [0.0; 3],
             origin_grid: [0.0; 3],
@@ -205,13 +209,13 @@ impl Rounding {
     }
 
     /// Adds a stored triangle.
-    fn add_stored(&mut self, key: &Key) {
+    fn add_stored(&mut self, corners: &[[f64; 3]; 3]) {
         if !self.quantized {
             return;
         }
-        for corner in key {
+        for corner in corners {
             for axis in 0..3 {
-                let bit = lowest_bit(corner[axis]);
+                let bit = lowest_bit(corner[axis] - self.origin[axis]);
                 self.lowest[axis] = [self.lowest[axis], bit].into_iter().flatten().min();
             }
         }
@@ -245,8 +249,18 @@ impl Rounding {
         }
     }
 
-    fn round(&self, position: [f64; 3]) -> [f32; 3] {
+    fn round(&self, position: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| {
+            if !self.quantized {
+                // As it was rounded on purpose, or to multiples of 2^-180; adding 0.0 turns -0.0 into 0.0, so that equal values have equal bits.
+                if self.rounded {
+                    return f64::from(position[axis] as f32) + 0.0;
+                }
+                let units = position[axis] * 2f64.powi(180);
+                let is_small = units.abs() < 2f64.powi(52);
+                return if is_small { units.round_ties_even() / 2f64.powi(180) } else { position[axis] }
+                    + 0.0;
+            }
             let mut offset = position[axis] - self.origin[axis];
             let snap = |value: f64, grid: f64| match grid {
                 0.0 => value,
@@ -255,16 +269,16 @@ impl Rounding {
             };
             offset = snap(offset, self.origin_grid[axis]);
             let rounded = f64::from(offset as f32);
-            // Adding 0.0 turns -0.0 into 0.0, so that equal values have equal bits.
-            snap(rounded, self.grid[axis]) as f32 + 0.0
+            self.origin[axis] + f64::from(snap(rounded, self.grid[axis]) as f32) + 0.0
         })
     }
 }
 
 /// Returns the exponent of the lowest set bit of a float, or `None` for 0.
-fn lowest_bit(bits: u32) -> Option<i32> {
-    let (exponent, fraction) = ((bits >> 23 & 255) as i32, bits & 0x7f_ffff);
+fn lowest_bit(value: f64) -> Option<i32> {
+    let bits = value.to_bits();
+    let (exponent, fraction) = ((bits >> 52 & 0x7ff) as i32, bits & ((1 << 52) - 1));
     let (mantissa, scale) =
-        if exponent == 0 { (fraction, -149) } else { (fraction | 1 << 23, exponent - 150) };
+        if exponent == 0 { (fraction, -1074) } else { (fraction | 1 << 52, exponent - 1075) };
     (mantissa != 0).then(|| scale + mantissa.trailing_zeros() as i32)
 }

@@ -26,7 +26,7 @@ use bvh_format::FormatError;
 use bvh_format::Layout;
 use bvh_format::bounds::Inflation;
 use bvh_format::ids::decode_id;
-use bvh_format::leaf::{PACKET, decode_packet};
+use bvh_format::leaf::{PACKET, VertexBlock};
 use bvh_format::object::Object;
 use bvh_format::source::Source;
 use bvh_format::validate::packets;
@@ -267,22 +267,24 @@ where
 
     /// Checks that the record's box and sphere contain all corners stored.
     fn check_hull(&self, object: &Object) -> Result<(), VerifyError> {
-        let record = object.record();
+        let (record, origin) = (object.record(), object.origin());
         let axes = [0, 1, 2];
         let (lo, hi) = (axes.map(|a| record.box_lo[a].get()), axes.map(|a| record.box_hi[a].get()));
         let centre = axes.map(|a| f64::from(record.sphere_centre[a].get()));
         let radius = f64::from(record.sphere_radius.get());
         self.each_triangle(object, |triangle| {
-            for (corner, v) in triangle.corners.iter().enumerate() {
+            for (corner, vertex) in triangle.corners.iter().enumerate() {
+                // Rounded to nearest, as the ends of the box are: the order stays.
+                let v = axes.map(|a| vertex[a] - origin[a]);
                 let what = || format!("{}, corner {corner}", triangle.name());
-                if axes.iter().any(|&a| v[a] < lo[a] || v[a] > hi[a]) {
+                if axes.iter().any(|&a| v[a] < lo[a].into() || v[a] > hi[a].into()) {
                     return Err(VerifyError::differs(
                         what(),
                         format!("within {lo:?} to {hi:?}"),
                         format!("{v:?}"),
                     ));
                 }
-                let distance = axes.map(|a| (f64::from(v[a]) - centre[a]).powi(2)).iter().sum::<f64>().sqrt();
+                let distance = axes.map(|a| (v[a] - centre[a]).powi(2)).iter().sum::<f64>().sqrt();
                 if distance > radius {
                     let expected = format!("within {radius:e} of {centre:?}");
                     return Err(VerifyError::differs(what(), expected, format!("{v:?}, at {distance:e}")));
@@ -305,12 +307,14 @@ where
             let leaves = layout.read_leaf_block(source, page.header())?;
             let ids = layout.read_id_block(source, page.header())?;
             let (block, ids) = (leaves.bytes(), ids.bytes());
+            let number_of_packets = page.header().packets.get().into();
+            let vertices =
+                VertexBlock::new(object.triangle_encoding(), object.vertices(), block, number_of_packets);
             for (packet, count) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                 let first = PACKET as u32 * (page.header().first_packet.get() + u32::from(packet));
                 for lane in 0..count {
                     let id = layout.has_ids().then(|| decode_id(ids, usize::from(packet), lane));
-                    let (place, corners) = (first + lane as u32, values.triangle(lane));
+                    let (place, corners) = (first + lane as u32, vertices.triangle(packet.into(), lane));
                     visit(&Stored { place, page: number, packet, lane, id, corners })?;
                 }
             }
@@ -383,8 +387,8 @@ struct Stored {
     lane: usize,
     /// Its number in the input, if the file has ids.
     id: Option<u32>,
-    /// The corners relative to the object's origin.
-    corners: [[f32; 3]; 3],
+    /// The vertices, in mesh units.
+    corners: [[f64; 3]; 3],
 }
 
 impl Stored {
@@ -394,11 +398,6 @@ impl Stored {
             None => format!("page {}, packet {}, lane {}", self.page, self.packet, self.lane),
         }
     }
-}
-
-/// Returns a stored vertex in mesh coordinates, which is exact by rule 37.
-fn place(object: &Object, v: [f32; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|axis| object.origin()[axis] + f64::from(v[axis]))
 }
 
 /// Returns the largest distance that a corner of the mesh may have from its stored place: both stated errors, plus room

@@ -17,11 +17,11 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Pod, Zeroable, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(C)]
 struct Traversals {
-    object: u32,
+    object: u64,
     /// The bits of both ends, the lesser one first.
-    ends: [[u32; 3]; 2],
+    ends: [[u64; 3]; 2],
     /// How often it is traversed from the first end to the second one, less how often the other way.
-    count: i32,
+    count: i64,
 }
 
 /// The duplicates of a triangle.
@@ -62,7 +62,7 @@ impl Surfaces {
     pub(super) fn add(
         &mut self,
         object: u32,
-        corners: &[[f32; 3]; 3],
+        corners: &[[f64; 3]; 3],
         count: i32,
     ) -> Result<(), VerifyError> {
         if self.stated.is_empty() {
@@ -74,7 +74,8 @@ impl Surfaces {
             let count = if from < to { count } else { -count };
             if from != to {
                 let ends = [from.min(to), from.max(to)];
-                self.edges.extend(&[Traversals { object, ends, count }], &self.spill)?;
+                let edge = Traversals { object: object.into(), ends, count: count.into() };
+                self.edges.extend(&[edge], &self.spill)?;
             }
         }
         Ok(())
@@ -86,7 +87,7 @@ impl Surfaces {
         &mut self,
         object: u32,
         place: u32,
-        corners: &[[f32; 3]; 3],
+        corners: &[[f64; 3]; 3],
         count: i32,
     ) -> Result<(), VerifyError> {
         self.duplicates.extend(&[Duplicates { object, place, count }], &self.spill)?;
@@ -112,7 +113,7 @@ impl Surfaces {
                 finish(last, sum);
                 sum = 0;
             }
-            sum += i64::from(edge.count);
+            sum += edge.count;
             last = Some(*edge);
             Ok(())
         })?;

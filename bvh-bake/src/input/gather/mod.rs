@@ -28,6 +28,7 @@ use crate::storage::resources::Resources;
 use crate::storage::{Piece, Spill};
 use crate::threads;
 use crate::triangles::placement::{Extent, Moved, Placement};
+use crate::triangles::prediction::predict;
 use crate::triangles::{Gathered, Part, TRIANGLES_PER_PART, Triangle, TriangleStream, WideTriangle};
 use input_order::ObjectRuns;
 use solids::SolidsForBake;
@@ -305,8 +306,8 @@ impl<'a> Gatherer<'a> {
         };
         let fill_open = |body: &mut Body, places: Range<usize>| {
             for place in places {
-                let triangle = triangle(place, &mut body.moved);
-                body.is_cloud &= body.extent.add_triangle(&triangle.corners);
+                let mut triangle = triangle(place, &mut body.moved);
+                body.is_cloud &= body.extent.add_triangle(&mut triangle.corners, &mut body.moved);
                 body.open.push(triangle);
             }
         };
@@ -327,8 +328,8 @@ impl<'a> Gatherer<'a> {
                 let places = start..start + TRIANGLES_PER_PART;
                 let (mut extent, mut moved, mut is_cloud) = (Extent::EMPTY, Moved::default(), true);
                 let mut measured = |place: usize| {
-                    let triangle = triangle(place, &mut moved);
-                    is_cloud &= extent.add_triangle(&triangle.corners);
+                    let mut triangle = triangle(place, &mut moved);
+                    is_cloud &= extent.add_triangle(&mut triangle.corners, &mut moved);
                     triangle
                 };
                 let part = match all_narrow(TRIANGLES_PER_PART, places.clone().map(&mut measured)) {
@@ -399,7 +400,10 @@ impl<'a> Gatherer<'a> {
             let name = names.next().unwrap_or_default();
             // A single object keeps its name; several objects that are joined have no name.
             let name = if split || names.next().is_none() { name } else { String::new() };
-            let placement = Placement::new(&body.extent, grid_error(&name, body.extent.diagonal())?);
+            let placement = match grid_error(&name, body.extent.diagonal())? {
+                Some(error) => Placement::quantized(&body.extent, error),
+                None => Placement::of(predict(&body.parts, &body.extent)?),
+            };
             let stream = TriangleStream {
                 parts: body.parts,
                 count: body.count,
@@ -408,7 +412,7 @@ impl<'a> Gatherer<'a> {
             let (stream, moved) = stream.placed_in_memory(&spill)?;
             gathered.push(Gathered {
                 name,
-                origin: placement.origin(),
+                behind: placement.behind(),
                 stream,
                 moved: moved.joined(body.moved),
                 vertices: body.vertices,

@@ -173,6 +173,15 @@ class Mesh:
         return self._mesh.radius()
 
     @property
+    def max_move(self) -> float:
+        """How far a vertex may be from the one that was given to the baker, in mesh units.
+
+        It is 0 unless vertices were quantised, rounded or welded on purpose, or lay below 2^-180. Answers are about the mesh as
+        it is stored.
+        """
+        return self._mesh.max_move()
+
+    @property
     def is_solid(self) -> bool:
         """Whether what is inside touches the mesh."""
         return self._mesh.is_solid()

@@ -318,9 +318,9 @@ impl Isa for Avx2 {
         Y(load_eight_of_bytes(self, low), load_eight_of_bytes(self, high))
     }
     #[inline(always)]
-    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Y {
+    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Y {
         let [low, high] = halves(integers);
-        Y(coordinates_of_eight(self, low, unit), coordinates_of_eight(self, high, unit))
+        Y(coordinates_of_eight(self, low, divisor), coordinates_of_eight(self, high, divisor))
     }
     #[inline(always)]
     fn permute(self, value: Y, places: &[u8; 16]) -> Y {
@@ -451,20 +451,20 @@ fn pick_eight(value: Y, places: __m128i) -> __m256 {
 
 /// What `coordinates` returns for eight integers.
 #[inline(always)]
-fn coordinates_of_eight(isa: Avx2, integers: &[i32; 8], unit: Option<f64>) -> __m256 {
+fn coordinates_of_eight(isa: Avx2, integers: &[i32; 8], divisor: Option<f64>) -> __m256 {
     let integers = load_integers(isa, integers);
     with_features!(isa, {
-        match unit {
+        match divisor {
             None => {
                 let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
                 _mm256_castsi256_ps(_mm256_xor_si256(integers, inverted))
             }
-            Some(unit) => {
-                let unit = _mm256_set1_pd(unit);
+            Some(divisor) => {
+                let divisor = _mm256_set1_pd(divisor);
                 let low = _mm256_cvtepi32_pd(_mm256_castsi256_si128(integers));
                 let high = _mm256_cvtepi32_pd(_mm256_extracti128_si256::<1>(integers));
-                let low = _mm256_cvtpd_ps(_mm256_mul_pd(low, unit));
-                _mm256_set_m128(_mm256_cvtpd_ps(_mm256_mul_pd(high, unit)), low)
+                let low = _mm256_cvtpd_ps(_mm256_div_pd(low, divisor));
+                _mm256_set_m128(_mm256_cvtpd_ps(_mm256_div_pd(high, divisor)), low)
             }
         }
     })

@@ -295,11 +295,11 @@ impl Isa for Avx512 {
         Z(load_sixteen_of_bytes(self, from))
     }
     #[inline(always)]
-    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Z {
+    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Z {
         let integers = load_integers(self, integers);
         with_features!(self, {
-            let low = coordinates_of_eight(self, _mm512_castsi512_si256(integers), unit);
-            let high = coordinates_of_eight(self, _mm512_extracti64x4_epi64::<1>(integers), unit);
+            let low = coordinates_of_eight(self, _mm512_castsi512_si256(integers), divisor);
+            let high = coordinates_of_eight(self, _mm512_extracti64x4_epi64::<1>(integers), divisor);
             Z(_mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high))
         })
     }
@@ -379,15 +379,18 @@ impl Avx512 {
 
 /// What `coordinates` returns for eight integers.
 #[inline(always)]
-fn coordinates_of_eight(isa: Avx512, integers: __m256i, unit: Option<f64>) -> __m256 {
+fn coordinates_of_eight(isa: Avx512, integers: __m256i, divisor: Option<f64>) -> __m256 {
     with_features!(
         isa,
-        match unit {
+        match divisor {
             None => {
                 let inverted = _mm256_srli_epi32::<1>(_mm256_srai_epi32::<31>(integers));
                 _mm256_castsi256_ps(_mm256_xor_si256(integers, inverted))
             }
-            Some(unit) => _mm512_cvtpd_ps(_mm512_mul_pd(_mm512_cvtepi32_pd(integers), _mm512_set1_pd(unit))),
+            Some(divisor) => {
+                let divisor = _mm512_set1_pd(divisor);
+                _mm512_cvtpd_ps(_mm512_div_pd(_mm512_cvtepi32_pd(integers), divisor))
+            }
         }
     )
 }

@@ -170,10 +170,10 @@ impl Isa for Scalar {
         Array(std::array::from_fn(|i| f32::from_le_bytes(lane(i))))
     }
     #[inline(always)]
-    fn coordinates(self, integers: &[i32; 16], unit: Option<f64>) -> Array<16> {
-        match unit {
+    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Array<16> {
+        match divisor {
             None => Array(integers.map(from_ordered)),
-            Some(unit) => Array(integers.map(|integer| (f64::from(integer) * unit) as f32)),
+            Some(divisor) => Array(integers.map(|integer| (f64::from(integer) / divisor) as f32)),
         }
     }
     #[inline(always)]

@@ -95,8 +95,8 @@ fn grid_pairs_agree_with_the_oracle() {
 
 #[test]
 fn grid_pairs_at_the_ends_of_the_range_agree_with_the_oracle() {
-    // Multiples of 2^-266, and coordinates of 2^125.
-    for unit in [2_f64.powi(-266), 2_f64.powi(123)] {
+    // Multiples of 2^-296, and coordinates of 2^125.
+    for unit in [2_f64.powi(-296), 2_f64.powi(123)] {
         let mut random = Random::new(41);
         for _ in 0..200 {
             let [a, b] = [(); 2].map(|()| float(&grid_triangle(&mut random, 5)).map(|p| p.map(|x| x * unit)));

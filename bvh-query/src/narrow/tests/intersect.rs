@@ -68,7 +68,7 @@ fn pairs_within_rounding_of_touching_agree_with_the_oracle() {
 
 #[test]
 fn the_ends_of_the_range_are_exact() {
-    // One unit in the last place decides, at coordinates of 2^125 and where they are multiples of 2^-266.
+    // One unit in the last place decides, at coordinates of 2^125 and where they are multiples of 2^-296.
     for scale in [2_f64.powi(123), 2_f64.powi(-214)] {
         let up = (1.0 + f64::EPSILON) * scale;
         let a = [[0.0; 3], [scale, 0.0, scale], [0.0, scale, scale]];

@@ -66,6 +66,8 @@ pub(crate) struct IntoObject {
     pub(crate) bounds: [[f64; 3]; 2],
     /// The sum of the magnitudes of all that.
     magnitude: f64,
+    /// How far vertices are from their offsets.
+    left_out: f64,
 }
 
 impl IntoObject {
@@ -75,7 +77,8 @@ impl IntoObject {
         let translation = pose.map_or([0.0; 3], |pose| pose.translation());
         let magnitude =
             [origin, bounds[0], bounds[1], translation].as_flattened().iter().map(|v| v.abs()).sum();
-        Self { rotation: pose.map(|pose| inverse(pose.rotation())), translation, origin, bounds, magnitude }
+        let (rotation, left_out) = (pose.map(|pose| inverse(pose.rotation())), object.volumes().left_out);
+        Self { rotation, translation, origin, bounds, magnitude, left_out }
     }
 
     /// Returns where a point is.
@@ -128,10 +131,10 @@ impl IntoObject {
         [lo, hi]
     }
 
-    /// Returns a bound on the error of points, and of placed vertices seen from the object, for probes whose coordinates have
-    /// magnitudes of this sum.
+    /// Returns a bound on the error of points, and of placed vertices and their offsets seen from the object, for probes whose
+    /// coordinates have magnitudes of this sum.
     #[inline(always)]
     pub(crate) fn error(&self, magnitude: f64) -> f64 {
-        ERROR * (self.magnitude + magnitude)
+        ERROR * (self.magnitude + magnitude) + self.left_out
     }
 }

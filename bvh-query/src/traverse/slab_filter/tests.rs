@@ -11,6 +11,7 @@ use bvh_format::page::{Page, PageShape, PageWriter, TightBound, WrittenPage};
 use bvh_format::profile::Profile;
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::turning::{TurningDirection, TurningSlab, decode_turning};
+use bvh_format::vertex::Vertices;
 use cbvh_testkit::Random;
 
 type Point = [f64; 3];
@@ -55,12 +56,12 @@ impl Node {
         writer.root(&Kdop::of_points(triangles.iter().flatten().flatten().copied()), None);
         writer.begin_treelet();
         for patch in &triangles {
-            let around = |direction| TurningSlab::around(direction, [&Packet::new(patch)]);
+            let around = |direction| TurningSlab::around(direction, [&Packet::new(patch)], [0.0; 3]);
             let turning = direction(patch).map(around);
             let kdop = Kdop::of_points(patch.as_flattened().iter().copied());
             writer.leaf(&TightBound { kdop, turning }, patch.iter().map(|&corners| (corners, 0)));
         }
-        Self { page: writer.finish(TriangleEncoding::F32, false), triangles }
+        Self { page: writer.finish(TriangleEncoding::F32, &Vertices::around([0.0; 3]), false), triangles }
     }
 
     fn magnitude(&self) -> f32 {

@@ -8,6 +8,7 @@ mod ask;
 mod boundary;
 mod far_apart;
 mod frames;
+mod given;
 mod hard_cases;
 mod kinds;
 mod lattice;

@@ -5,7 +5,7 @@ use crate::arguments::{Answer, refused, room};
 use crate::inspect::tree::page;
 use crate::mesh::Mesh;
 use bvh_format::ids::decode_id;
-use bvh_format::leaf::decode_packet;
+use bvh_format::leaf::VertexBlock;
 use bvh_format::page::Page;
 use bvh_format::treelet::Child;
 use js_sys::{Array, Float32Array, Uint8Array, Uint16Array};
@@ -36,7 +36,6 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
     corners.clear();
     let (mut numbers, mut in_page, mut slots, mut before) = (vec![], vec![], vec![], vec![]);
     for object in shape.objects() {
-        let origin = object.origin();
         for number in object.pages() {
             before.push(corners.len() as u32);
             let page = page(bvh, object, number).map_err(refused)?;
@@ -45,8 +44,9 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
             let header = page.header();
             let (block, id_block) =
                 (layout.leaf_block(bvh.bytes(), header), layout.id_block(bvh.bytes(), header));
+            let in_block = header.packets.get().into();
+            let vertices = VertexBlock::new(object.triangle_encoding(), object.vertices(), block, in_block);
             for (slot, packet, lanes) in packets(&page) {
-                let values = decode_packet(object.triangle_encoding(), block, usize::from(packet));
                 for lane in 0..lanes {
                     let place = header.first_packet.get().wrapping_add(packet.into()).wrapping_mul(4);
                     numbers.push(if layout.has_ids() {
@@ -56,9 +56,8 @@ pub fn stored_triangles(mesh: &Mesh, x: f64, y: f64, z: f64) -> Answer<Array> {
                     });
                     in_page.push(packet);
                     slots.push(slot);
-                    let near =
-                        |v: [f32; 3]| [0, 1, 2].map(|k| (origin[k] + f64::from(v[k]) - point[k]) as f32);
-                    corners.push(values.triangle(lane).map(near));
+                    let near = |v: [f64; 3]| [0, 1, 2].map(|k| (v[k] - point[k]) as f32);
+                    corners.push(vertices.triangle(packet.into(), lane).map(near));
                 }
             }
         }
