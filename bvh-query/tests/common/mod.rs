@@ -120,9 +120,12 @@ pub(crate) fn shared(name: &str) -> PathBuf {
     path
 }
 
-/// Returns a mesh of `shared/meshes`.
+/// Returns a mesh of `shared/meshes` in `f32` coordinates, about which the labels of that folder are.
 pub(crate) fn shared_mesh(name: &str) -> Mesh {
-    bvh_bake::input::read(&shared(&format!("meshes/{name}"))).unwrap()
+    let mut mesh = bvh_bake::input::read(&shared(&format!("meshes/{name}"))).unwrap();
+    let positions = mesh.objects.iter_mut().flat_map(|object| &mut object.positions);
+    positions.for_each(|position| *position = position.map(|value| f64::from(value as f32)));
+    mesh
 }
 
 /// Returns a file of `testdata/`.
