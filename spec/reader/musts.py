@@ -166,7 +166,7 @@ def of_object(one):
         yield f"(15.3) {where}: degenerate is {one.degenerate}, found {found}"
     if one.triangle_encoding != 2 and one.max_quantization_error != 0:
         yield f"(15.2) {where}: max_quantization_error {one.max_quantization_error}"
-    if one.triangle_encoding != 2 and one.max_vertex_rounding > 2.0**-239:
+    if one.triangle_encoding != 2 and one.max_vertex_rounding > 2.0**-180:
         yield f"(15.1) {where}: max_vertex_rounding {one.max_vertex_rounding}"
     if one.convex and not is_convex(one, vertices):
         yield f"(15.6) {where}: not closed, not in one component, or a vertex beyond a triangle of a convex object"

@@ -91,8 +91,8 @@ fn move_to_unit(corners: &mut [[f64; 3]; 3], moved: &mut Moved) {
     for value in corners.as_flattened_mut() {
         let given = std::mem::replace(value, on_unit(*value));
         if *value != given {
-            // Half a unit along each axis is less than one.
-            moved.rounding = moved.rounding.max(LEAST_UNIT);
+            // Half a unit along each axis: the root of three quarters.
+            moved.rounding = moved.rounding.max(0.9 * LEAST_UNIT);
         }
     }
 }

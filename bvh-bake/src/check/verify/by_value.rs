@@ -10,7 +10,6 @@ use crate::storage::resources::Resources;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::Object;
 use bvh_format::source::Source;
-use bvh_format::vertex::LEAST_UNIT;
 use bytemuck::{Pod, Zeroable};
 
 /// The bits of the corners in ascending order: equal triangles have the same key, whatever the order of their
@@ -183,7 +182,7 @@ struct Rounding {
     origin: [f64; 3],
     /// Whether the baker may have put vertices on a grid.
     quantized: bool,
-    /// Whether it has rounded coordinates to `f32`: they moved by more than the least unit.
+    /// Whether it may have rounded coordinates to `f32`: they moved, and the file has no others.
     rounded: bool,
     /// The lowest bit set in any stored coordinate, per axis.
     lowest: [Option<i32>; 3],
@@ -200,7 +199,7 @@ impl Rounding {
         Self {
             origin: object.origin(),
             quantized: object.triangle_encoding() == TriangleEncoding::Quantized,
-            rounded: object.record().max_vertex_rounding.get() > LEAST_UNIT,
+            rounded: object.record().max_vertex_rounding.get() > 0.0,
             lowest: [None; 3],
             largest: [0.0; 3],
             origin_grid: [0.0; 3],
@@ -211,6 +210,8 @@ impl Rounding {
     /// Adds a stored triangle.
     fn add_stored(&mut self, corners: &[[f64; 3]; 3]) {
         if !self.quantized {
+            // The nearest f32 number is the nearest multiple of 2^-180, too, if this is an f32 number.
+            self.rounded &= corners.as_flattened().iter().all(|&x| f64::from(x as f32) == x);
             return;
         }
         for corner in corners {
