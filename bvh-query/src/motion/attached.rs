@@ -65,6 +65,10 @@ impl RigidPath for AttachedPath<'_> {
         let reach = self.reach(radius);
         (valid(self.body.sagitta(reach, t0, t1)) + self.rounding(reach, t0, t1)) * (1.0 + ROUNDING)
     }
+
+    fn slides(&self, t0: f64, t1: f64) -> bool {
+        self.kept.is_empty() && self.body.slides(t0, t1)
+    }
 }
 
 /// A sagitta that is no number of at least 0 counts as infinite.

@@ -27,6 +27,15 @@ pub trait RigidPath {
     /// numbers, so that other paths can be built on them. The times may be in any order, as on a path that is reversed.
     /// Before 0 and after 1, these paths stand still. For NaN, the bound is infinite.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
+
+    /// Returns true only if B *slides* between two times: its rotation stays the same, and each coordinate of its translation
+    /// never falls or never rises, in all poses that [`RigidPath::pose`] returns, to the bit.
+    ///
+    /// Boxes along the axes of A then bound where B is without any rounding. Questions thereby tell flush parts apart that slide
+    /// along each other across a gap of a few roundings. Otherwise they would look at the pose in the middle of each cell.
+    fn slides(&self, _t0: f64, _t1: f64) -> bool {
+        false
+    }
 }
 
 impl<P: RigidPath + ?Sized> RigidPath for &P {
@@ -36,6 +45,10 @@ impl<P: RigidPath + ?Sized> RigidPath for &P {
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
         (**self).sagitta(radius, t0, t1)
+    }
+
+    fn slides(&self, t0: f64, t1: f64) -> bool {
+        (**self).slides(t0, t1)
     }
 }
 
@@ -110,7 +123,7 @@ impl Motion {
     /// and `end`, bit for bit.
     ///
     /// If a rotation is not orthonormal (a pose may be 2^-20 off), the nearest orthonormal rotation is interpolated,
-    /// and the difference from it is interpolated linearly.
+    /// and the difference from it is interpolated linearly. If both rotations are equal, B keeps that rotation, bit for bit.
     ///
     /// # Errors
     /// [`PathError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
@@ -131,7 +144,7 @@ impl Motion {
             rotation: first,
             defects: [difference(start.rotation(), &first), difference(end.rotation(), &reached)],
             axis,
-            angle,
+            angle: if start.rotation() == end.rotation() { 0.0 } else { angle },
             course: Course::Line,
         })
     }
@@ -192,16 +205,30 @@ impl Motion {
         self.angle
     }
 
-    /// Returns rotation and translation at a time.
+    /// Whether B does not turn.
+    fn keeps_rotation(&self) -> bool {
+        self.course == Course::Line && self.start.rotation() == self.end.rotation()
+    }
+
+    /// Returns rotation and translation at a time from 0 to 1.
     fn parts(&self, t: f64) -> (Matrix, [f64; 3]) {
         let turn_by = rodrigues(self.axis, t * self.angle);
         let ideal = product(&turn_by, &self.rotation);
-        let rotation = [0, 1, 2].map(|i| {
-            [0, 1, 2].map(|j| ideal[i][j] + ((1.0 - t) * self.defects[0][i][j] + t * self.defects[1][i][j]))
-        });
+        let rotation = if self.keeps_rotation() {
+            *self.start.rotation()
+        } else {
+            [0, 1, 2].map(|i| {
+                [0, 1, 2]
+                    .map(|j| ideal[i][j] + ((1.0 - t) * self.defects[0][i][j] + t * self.defects[1][i][j]))
+            })
+        };
         let (from, to) = (self.start.translation(), self.end.translation());
         let translation = match self.course {
-            Course::Line => [0, 1, 2].map(|k| (1.0 - t) * from[k] + t * to[k]),
+            // Monotonic in t, as each operation is.
+            Course::Line => [0, 1, 2].map(|k| {
+                let reached = from[k] + t * (to[k] - from[k]);
+                reached.clamp(from[k].min(to[k]), from[k].max(to[k]))
+            }),
             Course::Screw { point, shift } => {
                 let turned = turn(&turn_by, [0, 1, 2].map(|k| from[k] - point[k]));
                 [0, 1, 2].map(|k| turned[k] + (point[k] + t * shift * self.axis[k]))
@@ -217,7 +244,8 @@ impl Motion {
         // The angle is rounded before its sine is taken.
         let turned = POSE_ERROR * (1.0 + self.angle.abs());
         match self.course {
-            // Two products and a sum, however far away the line is.
+            // A difference, a product and a sum, however far away the line is.
+            Course::Line if self.keeps_rotation() => LINE_ERROR * ends,
             Course::Line => turned * radius + LINE_ERROR * ends,
             Course::Screw { point, shift } => turned * (radius + ends + 2.0 * sum(point) + 3.0 * shift.abs()),
         }
@@ -267,6 +295,10 @@ impl RigidPath for Motion {
             // Thrice: of the point, and of both ends of the segment.
             arc * (1.0 + 1.0 / (1 << 17) as f64) + 3.0 * self.rounding(radius)
         })
+    }
+
+    fn slides(&self, _t0: f64, _t1: f64) -> bool {
+        self.keeps_rotation()
     }
 }
 
@@ -375,6 +407,11 @@ impl RigidPath for Polyline {
 
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
         sagitta_of(self, radius, [t0, t1], |radius, times| self.sagitta_within(radius, times))
+    }
+
+    fn slides(&self, t0: f64, t1: f64) -> bool {
+        let ((first, _), (last, to)) = (self.at(t0), self.at(t1));
+        (first == last || first + 1 == last && to == 0.0) && self.motions[first].slides(t0, t1)
     }
 }
 

@@ -34,6 +34,10 @@ impl RigidPath for Pose {
     fn sagitta(&self, _radius: f64, _t0: f64, _t1: f64) -> f64 {
         0.0
     }
+
+    fn slides(&self, _t0: f64, _t1: f64) -> bool {
+        true
+    }
 }
 
 /// More than the norm of the inverse of any pose's rotation.
@@ -85,6 +89,13 @@ impl RigidPath for RelativePath<'_> {
         };
         let crossed = MOST * MOST * turned * moved / 4.0;
         (turning + MOST * bent + crossed) * (1.0 + ROUNDING) + ROUNDING * farthest
+    }
+
+    /// B slides along A's axes if it does along the world's, A stands still, and A's axes are the world's.
+    fn slides(&self, t0: f64, t1: f64) -> bool {
+        let stands = self.a.slides(t0, t1) && self.a.pose(t0) == self.a.pose(t1);
+        let zeros = self.a.pose(t0).rotation().as_flattened().iter().filter(|&&entry| entry == 0.0).count();
+        stands && zeros == 6 && self.b.slides(t0, t1)
     }
 }
 

@@ -404,6 +404,59 @@ fn a_slide_beside_a_face_takes_few_visits() {
     }
 }
 
+/// A slide along a face across a gap that no rounded arithmetic resolves has the answer of exact arithmetic, in few visits: boxes in
+/// decimal numbers of which one sum is rounded up, far from the origin too, in a scene, and by a path through several poses.
+#[test]
+fn parts_slide_across_a_gap_of_one_rounding() {
+    let block = |low: [f64; 3], high: [f64; 3]| -> Vec<Triangle> {
+        let scaled = |p: [f64; 3]| [0, 1, 2].map(|k| if p[k] > 0.0 { high[k] } else { low[k] });
+        cube().iter().map(|triangle| triangle.map(scaled)).collect()
+    };
+    // 0.1 + 0.2 is a rounding more than 0.3, and 1000.2 + 1.7 one more than 1001.9.
+    for (low, high, moved) in [(0.1, 0.3, 0.2), (1000.2, 1001.9, 1.7), (32.0, 33.0, 1.0 + 2f64.powi(-46))] {
+        assert!(low + moved > high && low + moved < high * (1.0 + 1e-15), "a gap of a rounding");
+        for axis in 0..3 {
+            let along = (axis + 1) % 3;
+            let part = block([low; 3], [high; 3]);
+            let [mut inner, mut outer] = [[low; 3], [high; 3]];
+            (inner[along], outer[along]) = (low - 2.0, low - 1.9);
+            outer[axis] += 0.05;
+            let mut stopped = part.clone();
+            stopped.extend(block(inner, outer));
+            let [free, stopped, slider] = [&part, &stopped, &part].map(|triangles| baked(triangles));
+            let place = |by: f64| {
+                let mut translation = [0.0; 3];
+                (translation[axis], translation[along]) = (moved, by);
+                at(translation[0], translation[1], translation[2])
+            };
+            let slide = Motion::between(&place(2.0), &place(-2.0)).unwrap();
+            let through = Polyline::new(&[place(2.0), place(-1.0), place(-2.0)]).unwrap();
+            let in_world = RelativePath::new(&Pose::IDENTITY, &slide);
+            for querier in &mut queriers() {
+                querier.set_budget(1 << 14);
+                for path in [&slide as &dyn RigidPath, &through, &in_world] {
+                    let answer = querier.motion(&free, &slider, path, &MotionOptions::new());
+                    assert!(
+                        matches!(answer, Ok(MotionAnswer::Near { nearest, .. }) if nearest.upper < 1e-6),
+                        "{answer:?}"
+                    );
+                    let answer = querier.motion(&stopped, &slider, path, &MotionOptions::new());
+                    let Ok(MotionAnswer::Hit { touching_at, .. }) = answer else { panic!("{answer:?}") };
+                    let reached = path.pose(touching_at).translation()[along];
+                    assert!((reached + 1.9).abs() < 0.2 + 1e-6 && reached < -1.6, "{answer:?}");
+                }
+                querier.set_budget(u64::MAX);
+                let coarse = MotionOptions::new().tolerance(0.02);
+                for (name, mesh) in [("free", &free), ("stopped", &stopped)] {
+                    let answer = querier.motion(mesh, &slider, &slide, &coarse).unwrap();
+                    let expected = plain(querier, (mesh, &slider), &slide, (0.0, 0.02));
+                    assert_eq!(answer, expected, "{name}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn numbers_that_mean_nothing_are_refused() {
     let (mut querier, block) = (Querier::new().unwrap(), baked(&cube()));

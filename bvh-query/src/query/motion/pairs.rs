@@ -51,6 +51,8 @@ pub(super) struct Sweep {
     pub(super) end: Pose,
     /// How far apart parts must be to be left out, in mesh units.
     pub(super) limit: f64,
+    /// How far apart boxes of triangles along A's axes must be. If B slides, that is free of rounding.
+    pub(super) box_limit: f64,
 }
 
 impl Sweep {
@@ -59,7 +61,7 @@ impl Sweep {
     #[inline(always)]
     fn sets_apart<I: Isa>(&self, isa: I, pair: &SweptPair) -> bool {
         let ends = [placed(&pair.b, &self.start), placed(&pair.b, &self.end)];
-        box_gap(&pair.a, ends.as_flattened()) > self.limit || {
+        box_gap(&pair.a, ends.as_flattened()) > self.box_limit || {
             let middle = placed(&pair.b, &self.middle);
             self.is_apart_along(normal(&pair.a), &pair.a, &ends)
                 || self.is_apart_along(normal(&middle), &pair.a, &ends)

@@ -16,8 +16,12 @@ const DEFAULT_TOLERANCE: f64 = 1e-6;
 /// be reached before B moves by less than the rounding of its poses, which is below 2^-42 of these distances where the meshes
 /// are near each other. A cell may reach an eighth of the tolerance.
 const LEAST_TOLERANCE: f64 = 1.0 / (1u64 << 38) as f64;
-/// More than the relative error of all `f64` arithmetic on coordinates here.
-const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
+/// More than the error of all `f64` arithmetic on coordinates here, as a fraction of the sum of distances in
+/// [`Question::limit`]: 2^-49, or 16 u with u for 2^-53. Placing a corner of B takes 7 u of its distance from B's origin and 4 u of the
+/// translation; products with a direction of unit length take 3 u of how far corners are from A's origin, and their difference 2 u.
+/// That is 12 u of both radii and 9 u of a translation; the sum has both radii thrice, and two translations. A relative error of
+/// 6 u is that of the limit itself.
+const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// Two shapes, the path of B in A's frame, and what counts as a hit.
 pub(super) struct Question<'a> {
@@ -105,6 +109,18 @@ impl<'a> Question<'a> {
         let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
         let least = self.clearance + reach + self.sagitta(t0, t1);
         least * (1.0 + ROUNDING) + ROUNDING * magnitude
+    }
+
+    /// The same limit for boxes along A's axes. If B slides, rounding moves each corner to where it is in some pose, or not as far,
+    /// and a rounded gap exceeds a number only if the exact one does.
+    pub(super) fn box_limit(&self, stretch: &Stretch, reach: f64) -> f64 {
+        let [t0, t1] = stretch.times;
+        match reach {
+            _ if !self.path.slides(t0, t1) => self.limit(stretch, reach),
+            0.0 => self.clearance,
+            // As cells round it.
+            _ => (self.clearance + reach).next_up(),
+        }
     }
 
     /// Returns the sagitta of the path. If a user's path returns an invalid number, it counts as infinite.

@@ -287,8 +287,12 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     /// Returns how far apart parts must be at both ends of an interval to be left out. Before the first undecided cell, all cells
     /// of what is left out are clear. After it, only hits matter, and none of these cells is one.
     fn limit(&self, stretch: &Stretch) -> f64 {
-        let reach = if self.undecided.is_none() { self.question.tolerance / 8.0 } else { 0.0 };
-        self.question.limit(stretch, reach)
+        self.question.limit(stretch, self.reach())
+    }
+
+    /// How far B may be from its pose in the middle of a cell, if cells that are not clear matter.
+    fn reach(&self) -> f64 {
+        if self.undecided.is_none() { self.question.tolerance / 8.0 } else { 0.0 }
     }
 
     /// Returns whether a pose is a hit.
@@ -407,7 +411,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
         let question = self.question;
         let [start, end] = interval.stretch.poses;
-        let sweep = Sweep { start, middle: *middle, end, limit: self.limit(&interval.stretch) };
+        let (limit, box_limit) =
+            (self.limit(&interval.stretch), question.box_limit(&interval.stretch, self.reach()));
+        let sweep = Sweep { start, middle: *middle, end, limit, box_limit };
         let pairs = match &interval.pairs {
             Some(pairs) => pairs.clone(),
             None => {

@@ -254,7 +254,7 @@ mod tests {
             };
             let [start, middle, end] = [scaled(random), scaled(random), scaled(random)];
             let limit = size * [0.1, 1e-3, 1e-6][round / 8];
-            let sweep = Sweep { start, middle, end, limit };
+            let sweep = Sweep { start, middle, end, limit, box_limit: limit };
             for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
                 let mut querier = Querier::with_backend(backend);
                 querier.start();
