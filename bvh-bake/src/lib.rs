@@ -24,7 +24,8 @@
 //!
 //! The folder `examples` has a program to copy: `bake` bakes mesh files and prints the results.
 //!
-//! [`verify`] and [`verify_files`] compare a file with its mesh, and [`validate_in_parallel`] checks a file alone.
+//! [`verify`] and [`verify_files`] compare a file with its mesh, and [`validate_in_parallel`] checks a file alone. [`open_edges`] tells
+//! why objects are open, and [`Options::weld`] closes cracks.
 //!
 //! # How a bake works
 //!
@@ -70,9 +71,11 @@ pub use bake::report::{BakeReport, FileSummary};
 pub use bake::{to_bytes, to_bytes_with};
 pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::object::MAX_RADIUS;
+pub use bvh_format::open_edges::{EdgesOfKind, Gaps, OpenEdge, OpenEdges};
 pub use bvh_format::profile::Profile;
 pub use bvh_format::source::Source;
 pub use bvh_format::{FormatError, Layout};
+pub use check::open_edges::open_edges;
 pub use check::prove::{prove_bounds, validate_in_parallel};
 pub use check::verify::{VerifyError, VerifyOptions, VerifyReport, verify, verify_files};
 pub use error::{BakeError, InputError, LimitError, Place, ReadError, ShapeError};

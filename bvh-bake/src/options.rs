@@ -84,6 +84,14 @@ pub struct Options {
     /// How coordinates are rounded, those of a scene in the frames of its objects. Poses are not rounded, and nor are
     /// [`Self::radius`] and margins. Each file states by how much its vertices moved in `max_vertex_rounding`.
     pub round: Rounding,
+    /// The distance within which vertices are welded, in mesh units; 0 leaves them where they are. Before anything else, each vertex of
+    /// an object goes to the position of the first vertex within this distance of it, itself included: the one that comes first in the
+    /// order in which triangles and their corners use them. Positions are as given, so that welding is not transitive. It closes seams
+    /// that are open by rounding errors. Triangles that lose their area stay, and so does their number. The distance may be at most the diagonal of each
+    /// object's box, except for objects that are a single point; at the diagonal, an object collapses to points.
+    ///
+    /// `spec/format.md` (section 15.7) states which operations decide whether a vertex is within the distance.
+    pub weld: f64,
     /// The time spent on the tree.
     pub effort: Effort,
     /// Whether each object of the input gets a tree of its own. [`crate::FileBake`] names objects without a name after
@@ -116,6 +124,7 @@ impl Default for Options {
             triangles: None,
             max_error: None,
             round: Rounding::None,
+            weld: 0.0,
             effort: Effort::Default,
             split_objects: false,
             scene: false,
@@ -152,6 +161,12 @@ impl Options {
     #[must_use]
     pub fn round(self, round: Rounding) -> Self {
         Self { round, ..self }
+    }
+
+    /// Sets the distance within which vertices are welded, in mesh units; 0 leaves them where they are.
+    #[must_use]
+    pub fn weld(self, distance: f64) -> Self {
+        Self { weld: distance, ..self }
     }
 
     /// Sets the time spent on the tree.
@@ -211,7 +226,7 @@ impl Options {
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}{}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}{}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
@@ -219,6 +234,7 @@ impl Options {
             self.split_objects,
             self.ids,
             if self.turning_slabs { "" } else { " turning_slabs=false" },
+            if self.weld == 0.0 { String::new() } else { format!(" weld={:?}", self.weld) },
             if self.scene { " scene=true" } else { "" },
             if self.drop_nan { " drop_nan=true" } else { "" },
             if self.topology { "" } else { " topology=false" },

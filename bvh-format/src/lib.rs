@@ -68,6 +68,7 @@ pub mod kdop;
 pub mod layout;
 pub mod leaf;
 pub mod object;
+pub mod open_edges;
 pub mod ordered;
 pub mod page;
 pub mod profile;

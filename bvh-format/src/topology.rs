@@ -82,6 +82,33 @@ impl ObjectTopology {
         visit_list(source, &self.nets, |_, net| visit(net))
     }
 
+    /// Returns the nets at places of a range, by ascending places. Places must ascend in the file (rule 46), or some may be missing.
+    ///
+    /// # Errors
+    /// The errors of the source.
+    pub fn nets_between<S: Source + ?Sized>(
+        &self,
+        source: &S,
+        places: Range<u32>,
+    ) -> Result<Vec<Net>, S::Error> {
+        let entry = size_of::<Net>();
+        let at = |number: usize| self.nets.start + number * entry;
+        // The number of nets at places before one.
+        let before = |place: u32| {
+            let (mut low, mut high) = (0, self.net_count());
+            while low < high {
+                let middle = low + (high - low) / 2;
+                let bytes = source.read(at(middle)..at(middle) + size_of::<U32>())?;
+                let found = U32::read_from_bytes(&bytes).map_or(0, U32::get);
+                (low, high) = if found < place { (middle + 1, high) } else { (low, middle) };
+            }
+            Ok::<_, S::Error>(low)
+        };
+        let (start, end) = (before(places.start)?, before(places.end)?);
+        let bytes = source.read(at(start)..at(end.max(start)))?;
+        Ok(<[Net]>::ref_from_bytes(&bytes).map_or_else(|_| Vec::new(), <[Net]>::to_vec))
+    }
+
     /// Returns the number of components listed.
     pub fn component_count(&self) -> usize {
         self.components.len() / size_of::<U32>()
@@ -159,9 +186,6 @@ fn read_table(
         let at = at + (HEAD_BYTES + index * size_of::<TopologyRecord>()) as u64;
         let closed = record.closed.get();
         ensure(closed <= 1, Rule::TopologyRecord, at, || ("0 or 1".into(), closed.to_string()))?;
-        ensure(closed == 1 || record.nets.get() == 0, Rule::TopologyRecord, at + 8, || {
-            ("no nets, because the object is not closed".into(), record.nets.to_string())
-        })?;
         for (offset, count) in [(4, record.components), (8, record.nets)] {
             ensure(u64::from(count.get()) <= object.triangles(), Rule::TopologyRecord, at + offset, || {
                 (format!("at most {}, one per triangle", object.triangles()), count.to_string())

@@ -1,8 +1,10 @@
 //! What can go wrong when a file is opened and when a question is asked.
 
+use bvh_format::open_edges::OpenEdges;
 use bvh_format::{FormatError, Rule};
 use std::io;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Why a file cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -60,9 +62,21 @@ pub enum QueryError {
     Rounded,
     /// The question is about the inside of a shape, and this object of its file is not closed.
     #[error(
-        "expected closed objects, found object {0} with a boundary or with triangles that face both ways; repair the mesh, or ask about its surface"
+        "expected closed objects, found object {object} open: {}; repair the mesh, or ask about its surface",
+        explained(edges)
     )]
-    NotClosed(usize),
+    NotClosed {
+        /// The object.
+        object: usize,
+        /// Its open edges. `None` if it is damaged, or if it has more than 2^20 triangles or so many open edges that counting them takes more
+        /// than 16 MiB: then [`Bvh::open_edges`](crate::Bvh::open_edges) counts them.
+        edges: Option<Arc<OpenEdges>>,
+    },
+}
+
+/// Returns why an object is open.
+fn explained(edges: &Option<Arc<OpenEdges>>) -> String {
+    edges.as_ref().map_or_else(|| "cbvh validate counts its open edges".to_owned(), |edges| edges.to_string())
 }
 
 /// An invalid number, by the parameter that it was given for.

@@ -158,6 +158,7 @@ pub mod stages {
 
 pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::object::Object;
+pub use bvh_format::open_edges::{EdgesOfKind, Gaps, OpenEdge, OpenEdges};
 pub use bvh_format::profile::Profile;
 pub use bvh_format::{FormatError, Layout, Rule};
 

@@ -458,7 +458,6 @@ def check_topology(file):
     file.topology = [cbvh.Topology(file, number) for number in range(head.objects)]
     for topology, one in zip(file.topology, file.objects):
         need(topology.closed <= 1, 45, topology.place("closed"), "0 or 1", topology.closed)
-        need(topology.closed or not topology.nets, 45, topology.place("nets"), "no nets of an open object", topology.nets)
         for field in ("components", "nets"):
             count = getattr(topology, field)
             need(count <= one.triangles, 45, topology.place(field), f"at most {one.triangles}", count)

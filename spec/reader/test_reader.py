@@ -1517,7 +1517,8 @@ class Topology(unittest.TestCase):
 
     def test_records(self):
         self.assertEqual(self.verdict(2), 45)
-        self.assertEqual(self.verdict(0, (), [(self.doubled, 3)]), 45)
+        self.assertEqual(self.verdict(0, (), [(self.doubled, 3)]), 0)
+        self.assertEqual(self.verdict(0, (), [(self.doubled, 1)]), 47)
         self.assertEqual(self.verdict(components=range(4, 17)), 46)
         self.assertEqual(self.verdict(components=range(4, 18)), 45)
 

@@ -1,9 +1,12 @@
 //! `cbvh validate` and `cbvh verify`: checks a file by itself, and against the mesh from which it was baked.
 
 use crate::console::{self, Failure, Record, counted, hex, length, names, record, shown};
+use crate::open_edges;
 use crate::options::{size, whole};
 use crate::process;
-use bvh_bake::{FileError, StoredFile, VerifyError, VerifyOptions, validate_in_parallel, verify_files};
+use bvh_bake::{
+    FileError, StoredFile, VerifyError, VerifyOptions, open_edges, validate_in_parallel, verify_files,
+};
 use bvh_format::FormatError;
 use bvh_format::header::version_name;
 use bvh_format::source::Source;
@@ -12,6 +15,9 @@ use clap::Args;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+
+/// The memory for counting open edges, unless --max-memory says otherwise.
+const COUNTING_BYTES: u64 = 256 << 20;
 
 const VALIDATE_HELP: &str = "\
 Example:
@@ -29,7 +35,16 @@ of each kind (count, crossing, at_corner, folded, duplicate) and with the first 
 triangle_a, object_b and triangle_b). A file without ids has lost its exact duplicates, and numbers triangles by place. In \
 a scene, each object is asked by itself.
 
-The file is read piece by piece, in about 10 MiB of memory whatever its size. --max-memory SIZE keeps the process \
+If the file states which objects are closed, open ones are explained: how many edges have one triangle (boundary), two that face \
+opposite ways (flipped), or more that do not cancel (crowded); the first edges of each kind, with their triangles and both ends; and \
+how near edges of one triangle are to other open ones. The gap of an edge is the distance within which a weld may make it one with \
+another open edge. If it is less than a hundredth of the edge, it is a crack, and the weld that should close all of them is proposed: see bake \
+--weld. With --json, the object has the fields closed (the number of closed objects) and open_edges (count; boundary, flipped and \
+crowded, each with count and first: objects with object, triangles, from, to and gap; nearest_gap, cracks, widest_crack, \
+proposed_weld).
+
+The file is read piece by piece, in about 10 MiB of memory whatever its size, and up to 100 MiB if very many edges are open. Those that do not \
+fit go to scratch files in the system's folder for temporary files. --max-memory SIZE keeps the process \
 within SIZE; a SIZE that is too small exits with code 4.";
 
 /// What `validate` accepts.
@@ -55,12 +70,15 @@ pub(crate) struct ValidateArguments {
 /// Checks a file, prints what it is, and fails if it is invalid.
 pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
     let path = &arguments.file;
+    if arguments.max_memory.is_some() {
+        process::give_back();
+    }
     let result = StoredFile::open(path, arguments.max_memory).and_then(|file| {
         let layout = validate_in_parallel(&file)?;
-        Ok((layout, file.length()))
+        Ok((layout, file))
     });
     let file = path.display().to_string();
-    let (layout, file_bytes) = match result {
+    let (layout, stored) = match result {
         Ok(found) => found,
         Err(FileError::Format(error)) => {
             if arguments.json {
@@ -74,6 +92,14 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
     let (objects, pages) = (layout.objects.len() as u64, u64::from(layout.page_count()));
     let triangles = records().map(|record| record.triangles.get()).sum::<u64>();
     let (version, content) = (version_name(layout.version), hex(layout.content_checksum));
+    let file_bytes = stored.length();
+    let topology = layout.read_topology(&stored).map_err(|error| Failure::from_file(path, error))?;
+    let closed = layout.has_topology().then(|| topology.iter().filter(|object| object.closed).count() as u64);
+    let budget = arguments.max_memory.unwrap_or(COUNTING_BYTES);
+    let options = VerifyOptions::default().max_memory(budget);
+    let edges = layout.has_topology().then(|| open_edges(&layout, &stored, &options)).transpose();
+    let edges = edges.map_err(|error| Failure::from_verify(path, &file, error))?;
+    drop(stored);
     let found = arguments.self_contacts.then(|| SelfContacts::find(path, arguments.limit)).transpose()?;
     if arguments.json {
         let record = record! {
@@ -84,6 +110,8 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
             pages: pages,
             treelets: records().map(|record| record.treelets.get()).sum::<u64>(),
             triangles: triangles,
+            closed: closed,
+            open_edges: edges.as_ref().map(open_edges::json),
             file_bytes: file_bytes,
             content_xxh3: content,
             peak_rss_bytes: process::peak_bytes(),
@@ -91,11 +119,16 @@ pub(crate) fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
         return console::json(&record.with(found.map(|found| record! { self_contacts: found.json() })));
     }
     console::text(&format!(
-        "{}: valid, format {version}, {}, {}, {}, content {content}\n{}",
+        "{}: valid, format {version}, {}, {}, {}, content {content}\n{}{}",
         shown(&file),
         counted(objects, "object"),
         counted(pages, "page"),
         counted(triangles, "triangle"),
+        edges.filter(|edges| !edges.is_empty()).map_or_else(String::new, |edges| {
+            let open = counted(objects - closed.unwrap_or_default(), "open object");
+            let list = open_edges::list(&edges, objects > 1);
+            format!("{}: {open}: {edges}\n{list}", shown(&file))
+        }),
         found.map_or_else(String::new, |found| found.text(&file))
     ))
 }

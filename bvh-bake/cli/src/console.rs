@@ -64,9 +64,10 @@ impl Failure {
             }
             BakeError::OutputIsInput { .. } => Self::Usage(error.to_string()),
             // The mesh is valid, and other options bake it.
-            BakeError::MaxError { .. } | BakeError::Radius(_) | BakeError::NotClosed { .. } => {
-                Self::Usage(named)
-            }
+            BakeError::MaxError { .. }
+            | BakeError::Weld { .. }
+            | BakeError::Radius(_)
+            | BakeError::NotClosed { .. } => Self::Usage(named),
             BakeError::Memory { needed, .. } => Self::Limit(format!("{error}: {}", enough(*needed))),
             BakeError::Limit(_) => Self::Limit(named),
             // `Unproved` is a defect of the baker: neither the system nor the command line is to blame.

@@ -14,6 +14,7 @@ mod clash;
 mod console;
 mod dump;
 mod motion;
+mod open_edges;
 mod options;
 mod probe;
 mod process;

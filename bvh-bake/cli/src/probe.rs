@@ -4,6 +4,7 @@ use crate::asking::files::{self, numbers, read_all, read_lines};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
 use crate::console::{Failure, Record, record};
+use crate::open_edges;
 use bvh_format::checksum::Hasher;
 use bvh_format::object::MAX_COORDINATE;
 use bvh_query::{ClosestPoint, Querier, QueryError, Ray, RayHit, Shape, Side};
@@ -260,7 +261,11 @@ impl Answer {
             let (point, triangle) = (mesh::point(point), mesh::name(mesh, object, triangle));
             format!("  certainly {lower:?} to {upper:?}\n  at {point}, {triangle}\n")
         });
-        format!("{}\n{}", self.in_words(), found.unwrap_or_default())
+        let why = match self {
+            Self::Side(Side::Undefined) => open_edges::why(&[("", mesh.shape())]),
+            _ => String::new(),
+        };
+        format!("{}{why}\n{}", self.in_words(), found.unwrap_or_default())
     }
 }
 

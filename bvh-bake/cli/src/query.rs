@@ -4,6 +4,7 @@ use crate::asking::files::{self, read_all, read_poses, write_file};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
 use crate::console::{Failure, Record, counted, record, significant};
+use crate::open_edges;
 use crate::options::not_negative;
 use bvh_format::checksum::Hasher;
 use bvh_query::{
@@ -188,7 +189,7 @@ impl Question {
             Mode::Within => Answer::Within(querier.within(a, b, pose, self.within)?),
             Mode::Relation => Answer::Relation(querier.relation(a, b, pose)?),
             Mode::Penetration => match querier.penetration(a, b, pose, &PenetrationOptions::default()) {
-                Err(QueryError::NotClosed(_)) => Answer::Penetration(None),
+                Err(QueryError::NotClosed { .. }) => Answer::Penetration(None),
                 answer => Answer::Penetration(Some(answer?)),
             },
         })
@@ -196,6 +197,7 @@ impl Question {
 
     /// Returns an answer for a person, with the closest points and triangles or with the first contacts.
     fn describe(&self, [mesh_a, mesh_b]: [&LoadedMesh; 2], answer: &Answer) -> String {
+        let why = || open_edges::why(&[("A", mesh_a.shape()), ("B", mesh_b.shape())]);
         match answer {
             Answer::Collide(true) => "the meshes touch\n".to_owned(),
             Answer::Collide(false) => "the meshes do not touch\n".to_owned(),
@@ -216,8 +218,9 @@ impl Question {
                 text
             }
             Answer::Distance(distance) => mesh::describe([mesh_a, mesh_b], distance),
+            Answer::Relation(Relation::Undefined) => format!("{}{}\n", in_words(Relation::Undefined), why()),
             Answer::Relation(relation) => format!("{}\n", in_words(*relation)),
-            Answer::Penetration(None) => "undefined, because a mesh is not closed\n".to_owned(),
+            Answer::Penetration(None) => format!("undefined, because a mesh is not closed{}\n", why()),
             Answer::Penetration(Some(of)) => {
                 let [x, y, z] = of.translation;
                 format!(

@@ -146,6 +146,7 @@ impl<'a> FileBake<'a> {
         refuse_output(&self.inputs, &self.output)?;
         self.progress.expect_bytes(file_lengths(&self.inputs));
         storage::remove_stale(self.scratch_directory());
+        bake::check_numbers(&self.options)?;
         // If the budget is too small for any mesh, the inputs are not even read.
         self.require_memory(0, Resources::least(0))?;
         let inputs = self.find_inputs()?;

@@ -5,11 +5,13 @@ mod object;
 pub(crate) mod provenance;
 pub(crate) mod report;
 
+use crate::check::open_edges::{count_all, count_object};
 use crate::check::prove::prove;
 use crate::error::{BakeError, LimitError, excerpt};
 use crate::input::gather::Gatherer;
+use crate::input::gather::weld::check_length;
 use crate::input::mesh::{Instance, Mesh};
-use crate::options::Options;
+use crate::options::{Options, Rounding};
 use crate::pages::assemble::{Contents, assemble};
 use crate::pages::brick::EncodedObject;
 use crate::pages::unnumbered::ObjectPages;
@@ -21,10 +23,13 @@ use crate::storage::resources::Resources;
 use crate::threads;
 use crate::topology::TopologyLists;
 use crate::triangles::Gathered;
+use bvh_format::Layout;
 use bvh_format::object::{MAX_RADIUS, ObjectRecord};
+use bvh_format::open_edges::OpenEdges;
 use bvh_format::page::MAX_PAGES;
 use object::{Built, Prepared, Shared, next_batch};
 use report::{BakeReport, FileSummary};
+use std::borrow::Cow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -37,8 +42,8 @@ use std::time::Instant;
 ///
 /// # Errors
 /// `BakeError::Input` for a mesh that breaks the input contract (see `Mesh::check`), `Limit` for a mesh that exceeds a
-/// limit of the format, `MaxError` for an `Options::max_error` above a hundredth of the diagonal of an object's box,
-/// and `Unproved` if the result fails its own checks.
+/// limit of the format, `MaxError` for an `Options::max_error` above a hundredth of the diagonal of an object's box, `Weld` for an
+/// `Options::weld` that is no finite length or exceeds that diagonal, and `Unproved` if the result fails its own checks.
 pub fn to_bytes(mesh: &Mesh, options: &Options) -> Result<(Vec<u8>, BakeReport), BakeError> {
     to_bytes_with(mesh, options, "", &mut |_| ())
 }
@@ -81,10 +86,9 @@ fn bake(
     let resources = gatherer.resources();
     let (triangles, id_end) = (gatherer.triangles(), gatherer.id_end());
     let (instances, warnings) = (gatherer.take_instances(), gatherer.take_warnings());
-    if !(0.0..=MAX_RADIUS).contains(&options.radius) {
-        return Err(BakeError::Radius(options.radius));
-    }
-    let gathered = gatherer.finish(|name, diagonal| grid_error(options, name, diagonal))?;
+    check_numbers(options)?;
+    let provenance = &stating_moves(provenance, options);
+    let gathered = gatherer.finish(options.weld, |name, diagonal| grid_error(options, name, diagonal))?;
     resources.progress.expect(triangles);
     let mut baker = Baker::new(options, instances, id_end, resources);
     let mut gathered = gathered.into_iter().peekable();
@@ -92,6 +96,37 @@ fn bake(
         baker.add(next_batch(&mut gathered), begin)?;
     }
     Ok(BakeReport { warnings, ..baker.finish(provenance, output, begin)? })
+}
+
+/// Checks the numbers of options that do not depend on the mesh.
+///
+/// # Errors
+/// [`BakeError::Radius`] and [`BakeError::Weld`].
+fn check_numbers(options: &Options) -> Result<(), BakeError> {
+    if !(0.0..=MAX_RADIUS).contains(&options.radius) {
+        return Err(BakeError::Radius(options.radius));
+    }
+    check_length(options.weld)
+}
+
+/// Returns a provenance text with lines that state the distance of a weld and how coordinates are rounded before it, without which
+/// nobody can compare the file with the mesh.
+fn stating_moves<'a>(provenance: &'a str, options: &Options) -> Cow<'a, str> {
+    let mut text = Cow::Borrowed(provenance);
+    let mut state = |key: &str, value: String| {
+        if !text.lines().any(|line| line.strip_prefix(key).is_some_and(|rest| rest.starts_with('='))) {
+            let end = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
+            text = Cow::Owned(format!("{text}{end}{key}={value}\n"));
+        }
+    };
+    if options.weld == 0.0 {
+        return text;
+    }
+    if options.round != Rounding::None {
+        state("round", options.round.name().to_owned());
+    }
+    state("weld", format!("{:?}", options.weld));
+    text
 }
 
 /// Collects the objects that are baked.
@@ -207,22 +242,38 @@ impl<'a> Baker<'a> {
         let (instances, topology, records, objects, duplicates) =
             (self.instances, self.topology, self.records, self.objects, self.duplicates);
         let progress = &resources.progress;
-        let mut solids =
+        let solids =
             instances.iter().filter(|instance| instance.solid).map(|instance| instance.object as usize);
-        if let Some(open) = solids.find(|&object| !topology.is_closed(object)) {
-            return Err(BakeError::NotClosed { object: excerpt(records[open].0.as_bytes()) });
-        }
+        let all = if options.solid { 0..records.len() } else { 0..0 };
+        let open_solid = all.chain(solids).find(|&object| !topology.is_closed(object));
+        let open_solid = open_solid.map(|object| (object, excerpt(records[object].0.as_bytes())));
+        let is_open = topology.records.iter().any(|record| record.closed == 0);
         begin(Stage::Encode);
         let instance_count = instances.len() as u64;
         let contents = Contents { records, objects, instances, duplicates, topology, spill };
         assemble(contents, options.ids, provenance, target, progress)?;
         progress.reach(Step::Bake(Stage::Encode), self.kept);
+        // Open edges are counted in the finished bytes, with the memory that bricks no longer take.
+        let counting = (resources.scratch.spill(), resources.brick_bytes as u64);
+        if let Some((number, object)) = open_solid {
+            let layout = Layout::read_from(&target.source())?;
+            let edges = count_object(&layout, &target.source(), number, &counting.0, counting.1)?;
+            return Err(BakeError::NotClosed { object, edges: Box::new(edges) });
+        }
         begin(Stage::Prove);
         let (layout, inflation) = prove(&target.source(), progress)?;
         let topology = layout.read_topology(&target.source())?;
+        // A web page does not read the report, and asks the library instead.
+        let is_counted = !cfg!(all(target_family = "wasm", target_os = "unknown"));
+        let open_edges = match is_open {
+            true if !is_counted => None,
+            true => Some(count_all::<_, BakeError>(&layout, &target.source(), &counting.0, counting.1)?),
+            false => layout.has_topology().then(OpenEdges::default),
+        };
         progress.reach(Step::Bake(Stage::Prove), self.kept);
         Ok(BakeReport {
             file: FileSummary::new(&layout, target.length(), instance_count, &topology),
+            open_edges,
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
             warnings: Vec::new(),

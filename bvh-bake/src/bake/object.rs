@@ -2,7 +2,7 @@
 //!
 //! No object depends on another, so that many small ones are baked side by side.
 
-use crate::error::{BakeError, excerpt};
+use crate::error::BakeError;
 use crate::options::{Effort, Options};
 use crate::pages::Style;
 use crate::pages::brick::{EncodedObject, encode_object};
@@ -15,6 +15,7 @@ use crate::storage::external_sort::Sorter;
 use crate::storage::resources::Resources;
 use crate::topology::{MAX_FEW_PARTS, Nets, Survey};
 use crate::tree::{Aabb, Bricks};
+use crate::triangles::placement::Moved;
 use crate::triangles::{Gathered, Kept};
 use bvh_format::kdop::Kdop;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
@@ -106,10 +107,11 @@ pub(super) struct Built {
 
 impl Built {
     pub(super) fn new(prepared: Prepared, shared: &Shared) -> Result<Self, BakeError> {
-        let Shared { options, resources, has_topology, id_count, .. } = *shared;
+        let Shared { options, resources, id_count, .. } = *shared;
         let Prepared { gathered, measured, mut surveyed, nets, left_out, .. } = prepared;
-        let Gathered { name, behind, stream, moved, vertices, is_cloud } = gathered;
+        let Gathered { name, behind, stream, moved, welded, vertices, is_cloud } = gathered;
         let moved = moved.joined(measured.moved).rounded_up();
+        let welded = Moved { rounding: welded, ..Moved::default() }.rounded_up().rounding;
         let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
         let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
@@ -133,11 +135,6 @@ impl Built {
             turning_slabs: options.turning_slabs && profile.has_turning_slabs() && !is_cloud,
         };
         let encoded = encode_object(bricks, style, survey, resources, &shared.spill)?;
-        // A cloud of more points than are listed has no boundary.
-        let is_closed = encoded.topology.as_ref().is_none_or(|topology| topology.closed);
-        if options.solid && has_topology && !is_closed {
-            return Err(BakeError::NotClosed { object: excerpt(name.as_bytes()) });
-        }
         let bounds = bounds_of_vertices(&measured.bounds, &behind);
         let record = ObjectRecord {
             origin: behind.origin.map(Into::into),
@@ -146,7 +143,7 @@ impl Built {
             triangles: triangles.into(),
             packets: encoded.packets.into(),
             treelets: encoded.treelets.into(),
-            max_vertex_rounding: moved.rounding.into(),
+            max_vertex_rounding: sum_up(welded, moved.rounding).into(),
             max_quantization_error: moved.quantization.into(),
             input_triangles: id_count.into(),
             degenerate: surveyed.degenerate.into(),
@@ -177,6 +174,11 @@ fn bounds_of_vertices(bounds: &Aabb, behind: &Vertices) -> Kdop {
         (kdop.lo[axis], kdop.hi[axis]) = (bounds.lo(axis), bounds.hi(axis));
     }
     kdop.widened(&behind.margins())
+}
+
+/// Returns an upper bound of the sum of two lengths, which is their sum if one is 0.
+fn sum_up(a: f64, b: f64) -> f64 {
+    if a.min(b) == 0.0 { a + b } else { (a + b).next_up() }
 }
 
 /// Returns the diagonal of a box, in mesh units.

@@ -4,6 +4,7 @@ use crate::progress::Traffic;
 use bvh_format::Layout;
 use bvh_format::header::SectionKind;
 use bvh_format::leaf::TriangleEncoding;
+use bvh_format::open_edges::OpenEdges;
 use bvh_format::profile::Profile;
 use bvh_format::topology::ObjectTopology;
 
@@ -14,6 +15,9 @@ pub struct BakeReport {
     pub file: FileSummary,
     /// The reason for this layout: one sentence about the first object, or empty if the user chose the whole layout.
     pub reason: String,
+    /// The edges that leave objects open; `None` if the file does not state which objects are closed, and for open objects on
+    /// `wasm32-unknown-unknown`, where `bvh_query::Bvh::open_edges` counts them.
+    pub open_edges: Option<OpenEdges>,
     /// The largest error that is not coarse for an object of this size and number of triangles, in mesh units. `None`
     /// unless `Options::max_error` exceeds it, so that quantisation may have collapsed triangles that matter.
     pub advised_max_error: Option<f64>,

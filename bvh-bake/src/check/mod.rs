@@ -1,4 +1,5 @@
-//! Checks of finished files: the proof that is part of every bake, and the comparison of a file with its mesh.
+//! Checks of finished files: the proof that is part of every bake, the count of open edges, and the comparison of a file with its mesh.
 
+pub(crate) mod open_edges;
 pub(crate) mod prove;
 pub(crate) mod verify;

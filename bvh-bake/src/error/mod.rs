@@ -10,6 +10,7 @@ pub use read::{Place, ReadError};
 pub use shape::ShapeError;
 
 use bvh_format::FormatError;
+use bvh_format::open_edges::OpenEdges;
 use std::path::PathBuf;
 
 /// The reason why a bake failed. The output's name still has its old content, if it had any.
@@ -82,17 +83,33 @@ pub enum BakeError {
         /// The diagonal of the object's box, in mesh units.
         diagonal: f64,
     },
+    /// The distance within which vertices should be welded is no length, or exceeds an object.
+    #[error(
+        "{}expected a weld distance from 0 to {}, found {found:e}; weld within a little more than the widest crack, which \
+         a bake without it states",
+        of_object(object), diagonal_of_box(*diagonal)
+    )]
+    Weld {
+        /// The object's name, shortened; empty if it has none, or if the distance is no length.
+        object: String,
+        /// The distance, in mesh units.
+        found: f64,
+        /// The diagonal of the object's box, in mesh units; `None` if the distance is no length.
+        diagonal: Option<f64>,
+    },
     /// The radius of the objects is no length, or too large.
     #[error("expected a radius from 0 to 2^118, found {0:e}")]
     Radius(f64),
     /// An object that is to be solid has no inside.
     #[error(
-        "{}expected a closed surface, which a solid needs, found one with a boundary; close it, or leave it hollow",
+        "{}expected a closed surface, which a solid needs, found an open one: {edges}; close it, or leave it hollow",
         of_object(object)
     )]
     NotClosed {
         /// The object's name, shortened; empty if it has none.
         object: String,
+        /// Its open edges.
+        edges: Box<OpenEdges>,
     },
     /// There is too little room for scratch files and the output.
     #[error("{}: expected room for {needed} bytes of scratch files and output, found {found}", directory.display())]
@@ -132,6 +149,11 @@ pub enum LimitError {
 
 fn of_object(name: &str) -> String {
     if name.is_empty() { String::new() } else { format!("object \"{name}\": ") }
+}
+
+fn diagonal_of_box(diagonal: Option<f64>) -> String {
+    let diagonal = diagonal.map_or(String::new(), |diagonal| format!(" {diagonal:.2e}"));
+    format!("the diagonal{diagonal} of the object's box")
 }
 
 fn counted(triangles: u64) -> String {

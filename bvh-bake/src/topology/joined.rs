@@ -124,7 +124,7 @@ pub(crate) fn join(
     closed &= last.is_none_or(|(_, count)| count == 0);
     let components = parts.map_or_else(Vec::new, Parts::components);
     let mut nets = Sorter::of_runs(run::<[u32; 2]>(resources));
-    if closed && has_nets {
+    if has_nets {
         let (of_ids, netted) = (of_ids.finish(), netted.finish());
         let (mut of_ids, mut netted) = (of_ids.merge(), netted.merge());
         while let Some([id, net]) = of_ids.next()? {

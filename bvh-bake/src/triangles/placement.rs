@@ -20,7 +20,7 @@ impl Extent {
         Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3], all_f32: [true; 3] };
 
     #[inline]
-    fn add(&mut self, position: &[f64; 3]) {
+    pub(crate) fn add(&mut self, position: &[f64; 3]) {
         for axis in 0..3 {
             let value = position[axis];
             self.lo[axis] = self.lo[axis].min(value);
@@ -98,7 +98,7 @@ fn move_to_unit(corners: &mut [[f64; 3]; 3], moved: &mut Moved) {
 }
 
 /// Returns the multiple of the least unit that is nearest to a coordinate, ties to even.
-fn on_unit(coordinate: f64) -> f64 {
+pub(crate) fn on_unit(coordinate: f64) -> f64 {
     if coordinate.abs() >= NO_FINER || !coordinate.is_finite() {
         return coordinate;
     }

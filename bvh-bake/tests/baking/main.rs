@@ -5,11 +5,13 @@ mod clouds;
 mod files;
 mod golden;
 mod hull;
+mod open_edges;
 mod progress;
 mod rounding;
 mod stored;
 mod topology;
 mod verify;
+mod weld;
 
 use bvh_bake::mesh::Mesh;
 use cbvh_testkit::Triangle;

@@ -115,12 +115,10 @@ fn compare(name: &str, input: &[Triangle], bytes: &[u8], exact: bool) -> Stated 
     let input: Vec<[Point; 3]> = input.iter().map(|triangle| triangle.map(bits)).collect();
     assert_eq!(stated.closed, is_closed(&input), "{name}");
     let nets = nets_of(&input);
-    if stated.closed {
-        for (place, (id, [a, b, c])) in &stated.triangles {
-            let own = [[*a, *b, *c], [*b, *c, *a], [*c, *a, *b]].into_iter().min().unwrap();
-            let net = stated.nets.get(place).copied().unwrap_or(1);
-            assert_eq!(i64::from(net), nets[&own], "{name}: triangle {id}");
-        }
+    for (place, (id, [a, b, c])) in &stated.triangles {
+        let own = [[*a, *b, *c], [*b, *c, *a], [*c, *a, *b]].into_iter().min().unwrap();
+        let net = stated.nets.get(place).copied().unwrap_or(1);
+        assert_eq!(i64::from(net), nets[&own], "{name}: triangle {id}");
     }
     assert!(stated.nets.iter().all(|(place, &net)| net != 1 && stated.triangles.contains_key(place)));
     assert!(stated.components.is_sorted_by(|a, b| a < b), "{name}");

@@ -177,12 +177,12 @@ fn topology(input: &mut Input) -> Vec<u8> {
     let record = TopologyRecord {
         closed: (closed as u32).into(),
         components: (components as u32).into(),
-        nets: ((closed * nets) as u32).into(),
+        nets: (nets as u32).into(),
         reserved: 0.into(),
     };
     let mut section = write_topology_head(&[record]);
     places(input).iter().take(components).for_each(|place| section.extend(place.to_le_bytes()));
-    for place in places(input).iter().take(closed * nets) {
+    for place in places(input).iter().take(nets) {
         section.extend(place.to_le_bytes());
         section.extend(i32::from(input.byte() as i8).to_le_bytes());
     }

@@ -84,6 +84,8 @@ using Contact = cbvh_contact;
 using ContactRegion = cbvh_contact_region;
 using Patch = cbvh_patch;
 using SelfContact = cbvh_self_contact;
+using OpenEdgeCounts = cbvh_open_edge_counts;
+using OpenEdge = cbvh_open_edge;
 using DistanceAnswer = cbvh_distance_answer;
 using Separation = cbvh_separation;
 using Penetration = cbvh_penetration;
@@ -253,6 +255,7 @@ struct BakeOptions {
     bool allow_outside = false;
     bool drop_nan = false;
     double radius = 0;
+    double weld = 0;
 
     /// The texts stay those of this object.
     cbvh_bake_options raw() const {
@@ -278,6 +281,7 @@ struct BakeOptions {
         options.allow_outside = allow_outside;
         options.drop_nan = drop_nan;
         options.radius = radius;
+        options.weld = weld;
         return options;
     }
 };
@@ -611,6 +615,24 @@ public:
     std::vector<std::uint32_t> duplicates(std::uint32_t triangle) const {
         return detail::list<std::uint32_t>([&](std::uint32_t *triangles, std::size_t capacity, std::size_t *count) {
             return cbvh_mesh_duplicates(raw(), triangle, triangles, capacity, count);
+        });
+    }
+    /// How many edges leave the mesh open? None if it is closed.
+    OpenEdgeCounts open_edge_counts() const {
+        OpenEdgeCounts counts{};
+        check(cbvh_mesh_open_edge_counts(raw(), &counts));
+        return counts;
+    }
+    /// The first eight of these edges of each kind.
+    std::vector<OpenEdge> open_edges() const {
+        return detail::list<OpenEdge>([&](OpenEdge *edges, std::size_t capacity, std::size_t *count) {
+            return cbvh_mesh_open_edges(raw(), edges, capacity, count);
+        });
+    }
+    /// A sentence about them, with the remedy.
+    std::string open_edges_text() const {
+        return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {
+            return cbvh_mesh_open_edges_text(raw(), buffer, capacity, length);
         });
     }
     std::vector<std::uint8_t> bytes() const {

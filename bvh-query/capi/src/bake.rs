@@ -68,7 +68,11 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
     if !(0.0..=MAX_RADIUS).contains(&given.radius) {
         return Err(Failure::argument("options.radius", "a length from 0 to 2^118", given.radius));
     }
+    if !(given.weld.is_finite() && given.weld >= 0.0) {
+        return Err(Failure::argument("options.weld", "0 or a finite length above 0", given.weld));
+    }
     let options = Options::default()
+        .weld(given.weld)
         .profile(named("profile", profile, &Profile::ALL.map(Profile::name), Profile::from_name)?)
         .triangles(named("triangles", triangles, &encodings.map(TriangleEncoding::name), of_name)?)
         .effort(

@@ -5,8 +5,11 @@ use crate::entry::{about, caller_floats, entry, hand_out};
 use crate::input::{self, array, text};
 use crate::output::{self, One};
 use crate::status::{Failure, Status};
-use crate::types::{MAP, MAP_SPARSE, MAP_WHOLE, MeshHandle, READ};
-use bvh_query::{Bvh, OwnedShape, ReadAhead};
+use crate::types::{
+    MAP, MAP_SPARSE, MAP_WHOLE, MeshHandle, OPEN_BOUNDARY, OPEN_CROWDED, OPEN_FLIPPED, OpenEdgeRow,
+    OpenEdgesRow, READ,
+};
+use bvh_query::{Bvh, OpenEdge, OpenEdges, OwnedShape, ReadAhead};
 use std::ffi::{c_char, c_void};
 use std::path::Path;
 use std::sync::Arc;
@@ -181,6 +184,40 @@ pub unsafe extern "C" fn cbvh_mesh_solid(mesh: MeshHandle, solid: *mut MeshHandl
     unsafe { hand_out(("solid", solid), &MESHES, made) }
 }
 
+fn counts_of(edges: &OpenEdges) -> OpenEdgesRow {
+    let [boundary, flipped, crowded] = edges.kinds().map(|(_, of_kind)| of_kind.count);
+    OpenEdgesRow {
+        boundary,
+        flipped,
+        crowded,
+        cracks: edges.gaps.cracks,
+        nearest_gap: edges.gaps.nearest.unwrap_or(f64::NAN),
+        widest_crack: edges.gaps.widest_crack.unwrap_or(f64::NAN),
+        proposed_weld: edges.proposed_weld().unwrap_or(f64::NAN),
+    }
+}
+
+fn listed(edges: &OpenEdges) -> Vec<OpenEdgeRow> {
+    let row = |(kind, edge): (i32, &OpenEdge)| {
+        let mut triangles = [0; 4];
+        triangles.iter_mut().zip(&edge.triangles).for_each(|(row, triangle)| *row = *triangle);
+        OpenEdgeRow {
+            ends: edge.ends,
+            gap: edge.gap.unwrap_or(f64::NAN),
+            object: edge.object,
+            kind,
+            triangle_count: edge.triangles.len() as u32,
+            triangles,
+            reserved: 0,
+        }
+    };
+    let kinds = [OPEN_BOUNDARY, OPEN_FLIPPED, OPEN_CROWDED].into_iter().zip(edges.kinds());
+    kinds
+        .flat_map(|(kind, (_, of_kind))| of_kind.first.iter().map(move |edge| (kind, edge)))
+        .map(row)
+        .collect()
+}
+
 about! {
     mesh: MeshHandle, ask;
     one cbvh_mesh_radius() -> radius: f64 = mesh.shape().radius();
@@ -192,6 +229,9 @@ about! {
         let objects = mesh.bvh().objects();
         objects.get(number).ok_or_else(|| no_object(objects.len(), number))?.name()
     };
+    one cbvh_mesh_open_edge_counts() -> counts: OpenEdgesRow = counts_of(&mesh.shape().open_edges()?);
+    list cbvh_mesh_open_edges() -> edges: OpenEdgeRow = listed(&mesh.shape().open_edges()?);
+    text cbvh_mesh_open_edges_text() = &mesh.shape().open_edges()?.to_string();
     list cbvh_mesh_duplicates(triangle: u32,) -> triangles: u32 = mesh.bvh().duplicates_of(triangle)?;
     change cbvh_mesh_validate() = mesh.bvh().validate()?;
 }

@@ -71,6 +71,7 @@ structures! {
         drop_nan: i32,
         reserved: i32,
         round: *const c_char,
+        weld: f64,
     }
     RobotChoices {
         size: usize,
@@ -122,6 +123,24 @@ structures! {
     }
     PatchRow { first: usize, count: usize, center: [f64; 3], normal: [f64; 3], length: f64, area: f64, depth: f64 }
     PatchCounts { patches: usize, contacts: usize, total: usize }
+    OpenEdgesRow {
+        boundary: u64,
+        flipped: u64,
+        crowded: u64,
+        cracks: u64,
+        nearest_gap: f64,
+        widest_crack: f64,
+        proposed_weld: f64,
+    }
+    OpenEdgeRow {
+        ends: [[f64; 3]; 2],
+        gap: f64,
+        object: u32,
+        kind: i32,
+        triangle_count: u32,
+        triangles: [u32; 4],
+        reserved: u32,
+    }
     SelfContactRow { object_a: u32, triangle_a: u32, object_b: u32, triangle_b: u32, kind: i32 }
     MotionRow {
         outcome: i32,
@@ -194,6 +213,7 @@ numbers!(REGION_POINT = 0(RegionKind::Point), REGION_SEGMENT = 1(RegionKind::Seg
 numbers!(REGION_POLYGON = 2(RegionKind::Polygon));
 numbers!(SELF_CROSSING = 0(SelfContactKind::Crossing), SELF_AT_CORNER = 1(SelfContactKind::AtCorner));
 numbers!(SELF_FOLDED = 2(SelfContactKind::Folded), SELF_DUPLICATE = 3(SelfContactKind::Duplicate));
+numbers!(OPEN_BOUNDARY = 0, OPEN_FLIPPED = 1, OPEN_CROWDED = 2);
 numbers!(BASE_FIXED = 0, BASE_PLANAR = 1, BASE_FLOATING = 2);
 numbers!(FREE = 0, HIT = 1, NEAR = 2);
 numbers!(OUTSIDE = -1(Side::Outside), ON = 0(Side::On), INSIDE = 1(Side::Inside));

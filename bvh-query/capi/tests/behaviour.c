@@ -345,6 +345,42 @@ static void self_contacts(void) {
     OK(cbvh_mesh_free(fine));
 }
 
+/* Why a mesh is open: a tetrahedron whose last face has a corner of its own, a little off, and one without that face. */
+static void open_edges(void) {
+    const double vertices[3 * 5] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1e-6};
+    const uint32_t faces[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 4, 2, 3};
+    cbvh_mesh cracked, open, closed, solid;
+    cbvh_open_edge_counts counts;
+    cbvh_open_edge edges[8];
+    size_t count;
+    char text[200];
+    OK(cbvh_bake(vertices, 5, faces, 4, NULL, &cracked));
+    OK(cbvh_bake(vertices, 5, faces, 3, NULL, &open));
+    OK(cbvh_mesh_open_edge_counts(cracked, &counts));
+    CHECK(counts.boundary == 4 && counts.flipped == 0 && counts.crowded == 0 && counts.cracks == 4);
+    CHECK(counts.nearest_gap > 0.99e-6 && counts.widest_crack < 1.01e-6 && counts.proposed_weld == 1e-5);
+    OK(cbvh_mesh_open_edges(cracked, edges, 8, &count));
+    CHECK(count == 4 && edges[0].kind == CBVH_OPEN_BOUNDARY && edges[0].triangle_count == 1 && edges[0].object == 0);
+    CHECK(edges[0].gap == counts.nearest_gap && edges[3].triangles[0] == 3);
+    FAILS(cbvh_mesh_open_edges(cracked, edges, 3, &count), CBVH_BUFFER_TOO_SMALL, "edges: expected room for 4 elements");
+    OK(cbvh_mesh_open_edges_text(cracked, text, sizeof text, &count));
+    CHECK(strncmp(text, "4 edges have one triangle; the nearest gap is ", 46) == 0 && strstr(text, "--weld 1e-5") != NULL);
+    FAILS(cbvh_mesh_solid(cracked, &solid), CBVH_INVALID_ARGUMENT, text);
+    OK(cbvh_mesh_open_edge_counts(open, &counts));
+    CHECK(counts.boundary == 3 && counts.cracks == 0 && isnan(counts.widest_crack) && isnan(counts.proposed_weld));
+    const cbvh_bake_options options = {.size = sizeof options, .weld = 1e-5};
+    OK(cbvh_bake(vertices, 5, faces, 4, &options, &closed));
+    OK(cbvh_mesh_open_edge_counts(closed, &counts));
+    CHECK(counts.boundary == 0 && isnan(counts.nearest_gap));
+    OK(cbvh_mesh_open_edges(closed, NULL, 0, &count));
+    CHECK(count == 0);
+    OK(cbvh_mesh_solid(closed, &solid));
+    OK(cbvh_mesh_free(solid));
+    OK(cbvh_mesh_free(closed));
+    OK(cbvh_mesh_free(open));
+    OK(cbvh_mesh_free(cracked));
+}
+
 static int released;
 static void release(void *user) {
     released++;
@@ -1242,6 +1278,7 @@ int main(int count, char **arguments) {
     overlaps();
     clashes();
     self_contacts();
+    open_edges();
     borrowed();
     paths();
     trackers();

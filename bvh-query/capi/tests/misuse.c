@@ -267,6 +267,8 @@ static void bakes(void) {
     OPTION(round, "f16", "options.round: expected NULL or one of none, f32, found \"f16\"");
     OPTION(max_error, -1, "options.max_error: expected 0 or a finite length above 0");
     OPTION(radius, -1, "options.radius: expected a length from 0 to 2^118, found -1");
+    OPTION(weld, -1, "options.weld: expected 0 or a finite length above 0, found -1");
+    OPTION(weld, NAN, "options.weld: expected");
     OPTION(radius, NAN, "options.radius: expected");
     OPTION(radius, INFINITY, "options.radius: expected");
     OPTION(no_ids, 2, "options.no_ids: expected 0 or 1, found 2");
@@ -504,6 +506,10 @@ static void overlaps(void) {
           CBVH_INVALID_ARGUMENT, "regions: expected a pointer, found NULL");
     FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, NULL, MISALIGNED(cbvh_patch_counts), patches, 1, &count, NULL, 0,
               NULL), CBVH_INVALID_ARGUMENT, "counts: expected an address");
+    cbvh_open_edge_counts counted;
+    FAILS(cbvh_mesh_open_edge_counts(no_mesh, &counted), CBVH_INVALID_HANDLE, "mesh: ");
+    FAILS(cbvh_mesh_open_edge_counts(mesh, NULL), CBVH_INVALID_ARGUMENT, "counts: expected a pointer, found NULL");
+    FAILS(cbvh_mesh_open_edges(mesh, NULL, 1, &count), CBVH_INVALID_ARGUMENT, "edges: expected a pointer, found NULL");
     FAILS(cbvh_self_contacts(querier, no_mesh, contacts, 1, &count), CBVH_INVALID_HANDLE, "mesh: ");
     FAILS(cbvh_self_contacts(querier, mesh, NULL, 1, &count), CBVH_INVALID_ARGUMENT,
           "contacts: expected a pointer, found NULL");

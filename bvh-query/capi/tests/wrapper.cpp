@@ -210,6 +210,10 @@ void overlaps() {
     CHECK(few.regions.size() == 5 && few.total == regions.size());
     CHECK(querier.self_contacts(one).empty());
     const cbvh::Mesh twice = cbvh::Mesh::bake({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}});
+    CHECK(one.open_edges().empty() && one.open_edge_counts().boundary == 0 && one.open_edges_text() == "no edge is open");
+    const cbvh::Mesh sheet = cbvh::Mesh::bake({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+    CHECK(sheet.open_edges().size() == 3 && sheet.open_edge_counts().boundary == 3);
+    CHECK(sheet.open_edges_text().rfind("3 edges have one triangle; ", 0) == 0);
     const auto own = querier.self_contacts(twice);
     CHECK(own.size() == 1 && own[0].triangle_b == 1 && own[0].kind == CBVH_SELF_DUPLICATE);
 }

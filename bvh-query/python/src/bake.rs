@@ -20,6 +20,7 @@ pub(crate) struct BakeOptions {
     triangles: Option<String>,
     max_error: Option<f64>,
     round: Option<String>,
+    weld: f64,
     effort: Option<String>,
     ids: bool,
     topology: bool,
@@ -36,6 +37,7 @@ impl BakeOptions {
         };
         let mut options = Options::default()
             .max_error(self.max_error)
+            .weld(self.weld)
             .ids(self.ids)
             .topology(self.topology)
             .radius(self.radius)

@@ -12,6 +12,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 
+/// Open edges in the form of Python.
+type Found =
+    ([u64; 4], [Option<f64>; 3], Vec<(&'static str, u32, Vec<u32>, [[f64; 3]; 2], Option<f64>)>, String);
+
 /// All objects of a file, or one of them.
 #[pyclass(frozen, module = "cbvh._cbvh")]
 pub(crate) struct Mesh {
@@ -88,6 +92,20 @@ impl Mesh {
     fn solid(&self, py: Python<'_>) -> PyResult<Self> {
         let shape = detached(py, || self.shape.clone().solid()).map_err(query_error)?;
         Ok(Self { shape })
+    }
+
+    /// The open edges: the number of each kind and of cracks; the nearest gap, the widest crack and the weld that is proposed, if there
+    /// are any; the kind, object, triangles, ends and gap of those that are listed; and a sentence about them.
+    fn open_edges(&self, py: Python<'_>) -> PyResult<Found> {
+        let edges = detached(py, || self.shape.shape().open_edges()).map_err(query_error)?;
+        let kinds = edges.kinds();
+        let listed =
+            kinds.iter().flat_map(|(kind, of_kind)| of_kind.first.iter().map(move |edge| (*kind, edge)));
+        let listed =
+            listed.map(|(kind, edge)| (kind, edge.object, edge.triangles.clone(), edge.ends, edge.gap));
+        let [boundary, flipped, crowded] = kinds.map(|(_, of_kind)| of_kind.count);
+        let gaps = [edges.gaps.nearest, edges.gaps.widest_crack, edges.proposed_weld()];
+        Ok(([boundary, flipped, crowded, edges.gaps.cracks], gaps, listed.collect(), edges.to_string()))
     }
 
     fn radius(&self) -> f64 {

@@ -240,11 +240,38 @@ class Depths(unittest.TestCase):
             (TypeError, "limit: expected a whole number", lambda: mesh.self_contacts(limit="x")),
             (TypeError, "other: expected a cbvh.Mesh", mesh.penetration, "x", at),
             (ValueError, "poses: expected shape (4, 4) or (N, 4, 4), found (3, 4)", mesh.patches, mesh, at[:3]),
-            (ValueError, "expected closed objects, found object 0 with a boundary", opened().penetration, mesh, at),
-            (ValueError, "expected closed objects, found object 0 with a boundary", mesh.separation, opened(), at, [1, 0, 0]),
+            (ValueError, "expected closed objects, found object 0 open: ", opened().penetration, mesh, at),
+            (ValueError, "expected closed objects, found object 0 open: ", mesh.separation, opened(), at, [1, 0, 0]),
             (ValueError, "topology", cbvh.bake(*cube(), topology=False).penetration, mesh, at),
         ]
         check_errors(self, cases)
+
+    def test_open_edges_tell_why_and_a_weld_closes(self):
+        vertices, faces = cube()
+        self.assertEqual(cbvh.bake(vertices, faces).open_edges()[:4], (0, 0, 0, []))
+        hole = cbvh.bake(vertices, faces[1:])
+        open_edges = hole.open_edges()
+        self.assertEqual((open_edges.boundary, open_edges.flipped, open_edges.crowded), (3, 0, 0))
+        self.assertEqual((open_edges.cracks, open_edges.proposed_weld), (0, None))
+        self.assertEqual(str(open_edges)[:28], "3 edges have one triangle; t")
+        corners = {tuple(vertex) for vertex in np.asarray(vertices, float)[faces[0]].tolist()}
+        for edge in open_edges.edges:
+            self.assertEqual((edge.kind, edge.object, len(edge.triangles)), ("boundary", 0, 1))
+            self.assertLessEqual({tuple(end) for end in edge.ends.tolist()}, corners)
+        # Each triangle with vertices of its own, some of which are a little off.
+        apart = np.asarray(vertices, float)[np.asarray(faces).reshape(-1)]
+        apart[::4] *= 1 + 1e-6
+        own = np.arange(len(apart)).reshape(-1, 3)
+        cracked = cbvh.bake(apart, own)
+        weld = cracked.open_edges().proposed_weld
+        self.assertTrue(1e-6 < weld < 1e-4, weld)
+        with self.assertRaisesRegex(ValueError, f"bake with --weld {weld:.0e}".replace("e-0", "e-")):
+            cracked.solid()
+        closed = cbvh.bake(apart, own, weld=weld)
+        self.assertEqual(closed.open_edges()[:4], (0, 0, 0, []))
+        self.assertEqual(closed.side([[0.0, 0.0, 0.0]]).tolist(), [cbvh.Side.INSIDE])
+        with self.assertRaisesRegex(ValueError, "topology"):
+            cbvh.bake(vertices, faces, topology=False).open_edges()
 
     def test_scenes_ask_about_pairs(self):
         scene = cbvh.Scene()

@@ -160,10 +160,10 @@ impl Asker {
             return Ok(false);
         }
         let failed = |source| failed(setting, pair, source);
-        let solid = match shape.clone().solid() {
-            Err(QueryError::NotClosed(_)) => return Ok(false),
-            solid => solid.map_err(failed)?,
-        };
+        if !shape.shape().is_closed().map_err(failed)? {
+            return Ok(false);
+        }
+        let solid = shape.clone().solid().map_err(failed)?;
         let [a, b] =
             [pair.a, pair.b].map(|part| if part == outer { &solid } else { &setting.parts[part].shape });
         self.querier.collide(a, b, &relative.pose()?).map_err(failed)

@@ -2,6 +2,7 @@
 
 use crate::error::{OpenError, QueryError};
 use crate::file::memory;
+use crate::file::open_edges::Counted;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::unpack::unpack;
 use crate::isa::Isa;
@@ -50,6 +51,7 @@ struct OpenFile {
     duplicates_checked: AtomicBool,
     /// What the file states about the topology of each object, or how it breaks a rule there, once it has been needed.
     topology: OnceLock<Result<Box<[ObjectTopology]>, FormatError>>,
+    counted: Counted,
     /// A number that no other open file of this process has or had.
     identity: u64,
 }
@@ -133,7 +135,7 @@ impl Bvh {
         static OPENED: AtomicU64 = AtomicU64::new(0);
         let identity = OPENED.fetch_add(1, Ordering::Relaxed);
         let duplicates_checked = AtomicBool::new(false);
-        let topology = OnceLock::new();
+        let (topology, counted) = (OnceLock::new(), Counted::default());
         Ok(Self(Arc::new(OpenFile {
             bytes,
             advised,
@@ -141,6 +143,7 @@ impl Bvh {
             checked,
             duplicates_checked,
             topology,
+            counted,
             identity,
         })))
     }
@@ -168,6 +171,11 @@ impl Bvh {
     /// Returns what the file states about the topology of its objects, once it has been needed.
     pub(super) fn known_topology(&self) -> &OnceLock<Result<Box<[ObjectTopology]>, FormatError>> {
         &self.0.topology
+    }
+
+    /// Returns the open edges that have been counted.
+    pub(super) fn counted(&self) -> &Counted {
+        &self.0.counted
     }
 
     /// Returns a number that no other open file of this process has or had.

@@ -5,6 +5,7 @@ pub(crate) mod files;
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) mod mapped;
 mod memory;
+mod open_edges;
 pub(crate) mod owned_shape;
 pub(crate) mod place;
 pub(crate) mod shape;

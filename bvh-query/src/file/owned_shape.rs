@@ -88,7 +88,7 @@ impl OwnedShape {
     /// [`QueryError::Damaged`] if a copy is needed and a mapped file is no longer what it was when it was opened.
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>, QueryError> {
         let bytes = self.bvh.bytes();
-        let is_solid = self.is_solid && self.bvh.all().solid().is_ok();
+        let is_solid = self.is_solid && self.bvh.all().is_closed().is_ok_and(|is_closed| is_closed);
         if rounding(self.bvh.objects()) == (self.radius, is_solid) {
             return Ok(Cow::Borrowed(bytes));
         }

@@ -84,15 +84,37 @@ impl<'a> Shape<'a> {
     /// Returns the shape as a solid: what is inside it touches it.
     ///
     /// # Errors
-    /// [`QueryError::NotClosed`] if an object of the shape is not closed and consistently oriented, so that it has no inside;
+    /// [`QueryError::NotClosed`] if an object of the shape is not closed and consistently oriented, so that it has no inside, with its
+    /// open edges ([`Bvh::open_edges`]), which takes some tenths of a second at most;
     /// [`QueryError::NoTopology`] if the file was baked without topology; [`QueryError::Damaged`] if that is damaged.
     pub fn solid(self) -> Result<Self, QueryError> {
-        for number in self.first..self.end {
+        self.check_closed()?;
+        Ok(Self { is_solid: true, ..self })
+    }
+
+    /// Returns whether all objects of the shape are closed. This never counts open edges, as the error of [`Shape::solid`] does.
+    ///
+    /// Cost: that of [`Bvh::is_closed`] for each object.
+    ///
+    /// # Errors
+    /// The errors of [`Bvh::is_closed`].
+    pub fn is_closed(self) -> Result<bool, QueryError> {
+        Ok(self.first_open()?.is_none())
+    }
+
+    /// Refuses a shape without an inside.
+    pub(crate) fn check_closed(self) -> Result<(), QueryError> {
+        self.first_open()?.map_or(Ok(()), |object| Err(self.bvh.not_closed(object)))
+    }
+
+    /// Returns the number of the first object that is not closed.
+    fn first_open(self) -> Result<Option<usize>, QueryError> {
+        for number in self.object_numbers() {
             if !self.bvh.topology(number)?.closed {
-                return Err(QueryError::NotClosed(number));
+                return Ok(Some(number));
             }
         }
-        Ok(Self { is_solid: true, ..self })
+        Ok(None)
     }
 
     /// Returns how far a vertex may be from the one that was given to the baker, in mesh units. Answers are about the mesh as it

@@ -31,7 +31,7 @@ impl<'a> Topology<'a> {
         self.of_object.components(self.bytes).iter().map(|place| place.get())
     }
 
-    /// Returns the net of a stored triangle of a closed object: how many equal triangles of the input have its
+    /// Returns the net of a stored triangle: how many equal triangles of the input have its
     /// orientation, itself included, less the number of those that have the opposite one.
     ///
     /// Cost: a binary search among the triangles whose net is not 1.

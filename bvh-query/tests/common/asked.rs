@@ -6,11 +6,12 @@ use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
-    Bvh, ClosestPoint, Contact, Distance, PatchOptions, Patches, Penetration, PenetrationOptions, Pose,
-    Querier, QueryError, Ray, RayHit, Relation, SelfContact, Side,
+    Bvh, ClosestPoint, Contact, Distance, OpenEdges, PatchOptions, Patches, Penetration, PenetrationOptions,
+    Pose, Querier, QueryError, Ray, RayHit, Relation, SelfContact, Side,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The answers of a file to every query, errors included.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +31,8 @@ pub(crate) struct Answers {
     pub(crate) side: Result<Side, QueryError>,
     pub(crate) hits: Result<Vec<RayHit>, QueryError>,
     pub(crate) segment: Result<bool, QueryError>,
+    /// Of the first object of A.
+    pub(crate) open_edges: Result<Arc<OpenEdges>, QueryError>,
 }
 
 /// The largest number of contacts that is visited, because a forged file may have any number of equal triangles.
@@ -52,9 +55,10 @@ impl Answers {
             self.side.as_ref().err(),
             self.hits.as_ref().err(),
             self.segment.as_ref().err(),
+            self.open_edges.as_ref().err(),
         ];
         errors.into_iter().flatten().find(|error| {
-            !matches!(error, QueryError::NoTopology | QueryError::Rounded | QueryError::NotClosed(_))
+            !matches!(error, QueryError::NoTopology | QueryError::Rounded | QueryError::NotClosed { .. })
         })
     }
 
@@ -76,6 +80,7 @@ impl Answers {
             && holds(&self.self_contacts, &other.self_contacts)
             && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
             && holds(&self.penetration, &other.penetration) && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
+            && holds(&self.open_edges, &other.open_edges)
             && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
             // The limit of `within` is the distance, which may have been refused.
             && (self.distance.is_err() || holds(&self.within, &other.within))
@@ -121,6 +126,7 @@ impl Answers {
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),
             segment: querier.segment_hit(at, point, end),
+            open_edges: a.open_edges(0),
         }
     }
 }

@@ -49,6 +49,7 @@ fn options(given: &JsValue) -> Answer<Options> {
         .effort(effort.unwrap_or_default())
         .max_error(max_error)
         .round(round.unwrap_or_default())
+        .weld(get("weld").as_f64().unwrap_or(0.0))
         .ids(flag("ids"))
         .topology(flag("topology"))
         .radius(get("radius").as_f64().unwrap_or(0.0))

@@ -1,9 +1,9 @@
 //! A mesh in the bytes of a `.cbvh` file: all objects of the file, or one.
 
-use crate::answers::floats;
+use crate::answers::{floats, ids};
 use crate::arguments::{Answer, bytes, refused, room, wrong};
 use bvh_query::{Bvh, OwnedShape};
-use js_sys::{Float64Array, Uint8Array};
+use js_sys::{Array, Float64Array, JsString, Uint8Array};
 use wasm_bindgen::prelude::*;
 
 /// A handle to a mesh. Several handles may share the bytes of a file.
@@ -43,6 +43,36 @@ impl Mesh {
     /// The same mesh, of which the inside counts as well.
     pub fn solid(&self) -> Answer<Mesh> {
         Ok(Self { shape: self.shape.clone().solid().map_err(refused)? })
+    }
+
+    /// The open edges: the number of each kind and of cracks, the nearest gap, the widest crack and the weld that is proposed, or NaN;
+    /// of each edge that is listed its kind, its object and the number of its triangles; these triangles; both ends and the gap of each
+    /// edge; and a sentence about them.
+    #[wasm_bindgen(js_name = openEdges)]
+    pub fn open_edges(&self) -> Answer<Array> {
+        let edges = self.shape.shape().open_edges().map_err(refused)?;
+        let (mut counts, mut numbers, mut triangles, mut places) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (kind, (_, of_kind)) in (0..).zip(edges.kinds()) {
+            counts.push(of_kind.count as f64);
+            for edge in &of_kind.first {
+                numbers.extend_from_slice(&[kind, edge.object, edge.triangles.len() as u32]);
+                triangles.extend_from_slice(&edge.triangles);
+                places.extend_from_slice(edge.ends.as_flattened());
+                places.push(edge.gap.unwrap_or(f64::NAN));
+            }
+        }
+        counts.push(edges.gaps.cracks as f64);
+        for length in [edges.gaps.nearest, edges.gaps.widest_crack, edges.proposed_weld()] {
+            counts.push(length.unwrap_or(f64::NAN));
+        }
+        let found = Array::new();
+        found.push(&floats(counts.into_iter()));
+        found.push(&ids(numbers.into_iter()));
+        found.push(&ids(triangles.into_iter()));
+        found.push(&floats(places.into_iter()));
+        found.push(&JsString::from(edges.to_string()));
+        Ok(found)
     }
 
     pub fn radius(&self) -> f64 {

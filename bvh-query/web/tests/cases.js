@@ -50,6 +50,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.penetration(b, pose, { relativeGap: x, tolerance: y }),
         () => a.clash(b, pose, { clearance: x, tolerance: y, relativeGap: z, visits: 1000 }),
         () => a.selfContacts(),
+        () => a.openEdges(),
         () => a.motion(b, Motion.between(at(x, y, z), pose), { clearance: w, tolerance: v }),
         () => a.isFree(b, screw()),
         () => a.motion(b, Motion.through([...pose, ...at(u, v, w)])),
@@ -166,6 +167,18 @@ export const cases = {
         equal([face.normal, face.count.length, face.regions.kind.includes(RegionKind.POLYGON)], [[1, 0, 0], 1, true]);
         equal(cube.patches(cube, corner, { maxContacts: 3 }).regions.kind.length, 3);
         equal(cube.patches(cube, at(9, 0, 0)).first, []);
+
+        equal([cube.openEdges().boundary, cube.openEdges().edges], [0, []]);
+        // A tetrahedron whose last face has a corner of its own, a little off.
+        const corners = [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1e-6];
+        const faces = [0, 2, 1, 0, 1, 3, 0, 3, 2, 4, 2, 3];
+        const open = cbvh.Mesh.bake(corners, faces).openEdges();
+        equal([open.boundary, open.flipped, open.crowded, open.cracks, open.edges.length], [4, 0, 0, 4, 4]);
+        equal([open.edges[0].kind, open.edges[3].triangles, open.proposedWeld], ["boundary", [3], 1e-5]);
+        near(open.edges[0].gap, 1e-6, 1e-9, "the gap");
+        ok(open.text.includes("bake with --weld 1e-5"), open.text);
+        equal(cbvh.Mesh.bake(corners, faces, { weld: 1e-5 }).openEdges().boundary, 0);
+        equal(cbvh.Mesh.bake(corners, faces.slice(3)).openEdges().proposedWeld, undefined);
 
         equal(cube.selfContacts().triangles, []);
         const [first, crossing] = [

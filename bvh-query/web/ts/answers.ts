@@ -245,6 +245,46 @@ export interface SelfContacts {
     kind: Uint8Array;
 }
 
+/** How many triangles an open edge has: "boundary" one, "flipped" two that face opposite ways, "crowded" more that do not cancel. */
+export type OpenEdgeKind = "boundary" | "flipped" | "crowded";
+
+/** An edge that leaves an object open. */
+export interface OpenEdge {
+    kind: OpenEdgeKind;
+    /** The number of the object in the file. */
+    object: number;
+    /** The ids of its triangles, or their places in a file without ids: the smallest numbers, at most four. */
+    triangles: Uint32Array;
+    /** Both ends in mesh units, in the direction in which more triangles traverse the edge. */
+    from: Float64Array;
+    to: Float64Array;
+    /** For an edge of one triangle, how near another open edge is; `undefined` if that is not known. */
+    gap: number | undefined;
+}
+
+/** Why a mesh is not closed. */
+export interface OpenEdges {
+    /** The number of edges of one triangle: the border of a hole, of a sheet, or of a crack. */
+    boundary: number;
+    /** The number of edges of two triangles that face opposite ways. */
+    flipped: number;
+    /** The number of edges of more than two triangles, which do not cancel. */
+    crowded: number;
+    /** The first eight of each kind. */
+    edges: OpenEdge[];
+    /** The least gap. The gap of an edge of one triangle is the distance within which a bake with `weld` may make it one with another
+     * open edge, in mesh units. */
+    nearestGap: number | undefined;
+    /** The number of edges of one triangle whose gap is less than a hundredth of their length. */
+    cracks: number;
+    /** The greatest gap of a crack. */
+    widestCrack: number | undefined;
+    /** A distance for `weld` that should close all cracks. */
+    proposedWeld: number | undefined;
+    /** A sentence about them, with the remedy. */
+    text: string;
+}
+
 /** Whether a path is free, and where it ends if it is not. */
 export interface MotionAnswer {
     kind: MotionKind;
@@ -392,6 +432,40 @@ export function patches(parts: unknown[]): Patches {
 }
 
 export const selfContacts = ([triangles, kind]: unknown[]): SelfContacts => ({ triangles, kind }) as SelfContacts;
+
+const OPEN_EDGE_KINDS: OpenEdgeKind[] = ["boundary", "flipped", "crowded"];
+
+export function openEdges(of: unknown[]): OpenEdges {
+    const [counts, numbers, triangles, places, text] = of as [Float64Array, Uint32Array, Uint32Array, Float64Array, string];
+    const known = (length: number | undefined) => (Number.isNaN(length) ? undefined : length);
+    const edges: OpenEdge[] = [];
+    let first = 0;
+    for (let number = 0; 3 * number < numbers.length; number++) {
+        const [kind, object, count] = numbers.subarray(3 * number) as unknown as [number, number, number];
+        const place = places.subarray(7 * number);
+        edges.push({
+            kind: OPEN_EDGE_KINDS[kind] as OpenEdgeKind,
+            object,
+            triangles: triangles.slice(first, first + count),
+            from: place.slice(0, 3),
+            to: place.slice(3, 6),
+            gap: known(place[6]),
+        });
+        first += count;
+    }
+    const [boundary, flipped, crowded, cracks, nearest, widest, weld] = counts as unknown as number[];
+    return {
+        boundary: boundary as number,
+        flipped: flipped as number,
+        crowded: crowded as number,
+        edges,
+        nearestGap: known(nearest),
+        cracks: cracks as number,
+        widestCrack: known(widest),
+        proposedWeld: known(weld),
+        text,
+    };
+}
 
 export const motions = ([kind, freeUntil, at, nearest]: unknown[]): MotionAnswers =>
     ({ kind, freeUntil, at, nearest: distances(nearest as unknown[]) }) as MotionAnswers;

@@ -10,6 +10,7 @@ import type {
     Distances,
     MotionAnswer,
     MotionAnswers,
+    OpenEdges,
     Patches,
     Penetration,
     Penetrations,
@@ -47,6 +48,9 @@ export interface BakeOptions {
     /** How coordinates are rounded: "f32" rounds each to the nearest float32 number, ties to even, so that coordinates which are
      * equal in two meshes stay equal. "none" by default. */
     round?: string;
+    /** Moves each vertex to the first vertex within this distance of it, in mesh units, which closes seams that are open by rounding
+     * errors. At most the diagonal of the mesh's box. 0 by default, which leaves vertices where they are. */
+    weld?: number;
     /** The time spent on a better tree: "fast" or "default". */
     effort?: string;
     /** Whether triangles keep their numbers from the input; else the baker numbers them in its own order. True by default. */
@@ -130,6 +134,7 @@ function checked(options: BakeOptions): BakeOptions {
         ["triangles", "string"],
         ["maxError", "number"],
         ["round", "string"],
+        ["weld", "number"],
         ["effort", "string"],
         ["ids", "boolean"],
         ["topology", "boolean"],
@@ -466,6 +471,14 @@ export class Mesh extends Handle<raw.Mesh> {
      */
     selfContacts(): SelfContacts {
         return answers.selfContacts(this.#call((mesh) => raw.selfContacts(mesh)));
+    }
+
+    /**
+     * Which edges leave this mesh open, so that questions about what is inside have no answer? None if it is closed. Duplicates count
+     * with their orientation. Throws if the mesh was baked without topology.
+     */
+    openEdges(): OpenEdges {
+        return answers.openEdges(this.#call((mesh) => mesh.openEdges()));
     }
 
     /**

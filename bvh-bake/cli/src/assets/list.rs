@@ -128,6 +128,7 @@ struct Line {
     triangles: Option<String>,
     max_error: Option<f64>,
     round: Option<String>,
+    weld: Option<f64>,
     effort: Option<String>,
     split_objects: Option<bool>,
     scene: Option<bool>,
@@ -199,6 +200,7 @@ impl Line {
             None if !is_quantized => options.max_error = None,
             None => {}
         }
+        options.weld = self.weld.unwrap_or(options.weld);
         options.split_objects = self.split_objects.unwrap_or(options.split_objects);
         options.scene = self.scene.unwrap_or(options.scene);
         options.drop_nan = self.drop_nan.unwrap_or(options.drop_nan);

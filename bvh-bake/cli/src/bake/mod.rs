@@ -82,6 +82,7 @@ pub(crate) fn prepare(arguments: &BakeArguments) -> Result<Options, Failure> {
         .layout
         .to_options()
         .max_error(arguments.max_error)
+        .weld(arguments.weld)
         .effort(arguments.effort)
         .split_objects(arguments.split_objects)
         .scene(arguments.scene)
@@ -144,6 +145,12 @@ vertices moved. In a scene, the coordinates of objects are rounded, and poses ar
 --triangles quantized rounds vertices to a grid, so that small triangles may collapse. --max-error must not exceed a \
 hundredth of the diagonal of the object's box; an error that is large for the mesh is reported as a warning.
 
+--weld closes seams that are open by rounding errors: each vertex of an object goes to the position of the vertex within LENGTH \
+of it that triangles use first. Positions are as given, so that chains of near vertices do not collapse. Triangles that lose \
+their area stay. LENGTH must not exceed the diagonal of the object's box, and at the diagonal the object collapses. The distance by which \
+vertices move is part of max_vertex_rounding. Without --weld, the report of an open mesh states how near its open edges are to each \
+other.
+
 Warnings on standard error, and in the field warnings of --json, say what a reader did that the author of a file may not \
 expect, such as bytes that it left out.
 
@@ -178,7 +185,8 @@ Many assets:
   cbvh bake --manifest in.jsonl --out-manifest out.jsonl --max-memory 4GiB --shard 3/16
 
 Each line of in.jsonl is a JSON object such as {\"input\": \"rock.obj\", \"output\": \"rock.cbvh\"}. It may also have \
-profile, triangles, max_error, round, effort, split_objects, scene, drop_nan, ids, topology, radius and solid; the options on the command line are their \
+profile, triangles, max_error, round, weld, effort, split_objects, scene, drop_nan, ids, topology, radius and solid; the \
+options on the command line are their \
 defaults. Paths are relative to the manifest and may lead anywhere. Inputs must be regular files, so that the command never \
 waits for a pipe. Missing folders of outputs are created. Assets are baked side by side within --jobs \
 and --max-memory, and the failure of one does not stop the others. out.jsonl has one line per asset in the order of the \
@@ -224,6 +232,9 @@ pub(crate) struct BakeArguments {
     /// With --triangles quantized: how far a vertex may move, in mesh units [default: 1e-5 of the diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) max_error: Option<f64>,
+    /// Weld the vertices of each object: move each to the first vertex within this distance of it, in mesh units
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) weld: f64,
     /// Stay within this much memory, such as 512MiB or 2GB; the rest goes to scratch files
     #[arg(long, value_name = "SIZE", value_parser = size, allow_negative_numbers = true)]
     pub(crate) max_memory: Option<u64>,

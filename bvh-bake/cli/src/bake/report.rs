@@ -2,6 +2,7 @@
 
 use super::screen::Screen;
 use crate::console::{Record, counted, hex, length, names, record, shown, tell_json};
+use crate::open_edges;
 use crate::process;
 use bvh_bake::{BakeReport, FileSummary, Options, Outcome, Progress, Stage, Step, StoredFile, Traffic};
 use bvh_format::Layout;
@@ -82,6 +83,8 @@ impl Report {
             instances: file.instances,
             // The number of closed objects, or null if the file does not state which are.
             closed: file.closed,
+            // The edges that leave objects open, or null if the file does not state which are closed, or was up to date.
+            open_edges: baked.and_then(|baked| baked.open_edges.as_ref()).map(open_edges::json),
             file_bytes: file.file_bytes,
             node_bytes: file.node_bytes,
             triangle_bytes: file.triangle_bytes,
@@ -133,11 +136,16 @@ impl Report {
         } else if let Some([x, y, z]) = sides(Path::new(&self.output)) {
             line("size", format!("{x} by {y} by {z} mesh units"));
         }
+        let why = match &baked.open_edges {
+            Some(edges) if !edges.is_empty() => format!(": {edges}"),
+            _ => String::new(),
+        };
         match (file.closed, file.objects) {
             (None, _) => {}
-            (Some(closed), 1) => line("surface", if closed == 1 { "closed" } else { "open" }.to_owned()),
+            (Some(1), 1) => line("surface", "closed".to_owned()),
+            (Some(_), 1) => line("surface", format!("open{why}")),
             (Some(closed), objects) => {
-                line("surfaces", format!("{closed} closed, {} open", objects - closed));
+                line("surfaces", format!("{closed} closed, {} open{why}", objects - closed));
             }
         }
         let because = if baked.reason.is_empty() { String::new() } else { format!(": {}", baked.reason) };

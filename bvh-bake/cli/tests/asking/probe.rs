@@ -284,8 +284,16 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
     let open: Vec<String> = cube().lines().map(str::to_owned).collect();
     directory.write("open.obj", open[..open.len() - 1].join("\n"));
     for (point, words) in [
-        ("0 0 0", "undefined, because the mesh is not closed and consistently oriented\n"),
-        ("9 9 9", "undefined, because the mesh is not closed and consistently oriented\n"),
+        (
+            "0 0 0",
+            "undefined, because the mesh is not closed and consistently oriented: 4 edges have one triangle; the nearest gap is 2.00e0, and no \
+             crack\n",
+        ),
+        (
+            "9 9 9",
+            "undefined, because the mesh is not closed and consistently oriented: 4 edges have one triangle; the nearest gap is 2.00e0, and no \
+             crack\n",
+        ),
         ("-1 0 0", "on the mesh\n"),
     ] {
         let probe = ["probe", "open.obj", "--mode", "side", "--probe", point];
@@ -300,7 +308,8 @@ fn an_open_mesh_has_no_sides_but_its_surface() {
     let query = ["query", "open.obj", "tiny.obj", "--mode", "relation", "--pose", "1 0 0 0 0 1 0 0 0 0 1 0"];
     assert_eq!(
         cbvh_in(directory, &query).done().out,
-        "not touching, undefined because a mesh is not closed\n"
+        "not touching, undefined because a mesh is not closed: A: 4 edges have one triangle; the nearest gap is 2.00e0, and no \
+         crack; B: 3 edges have one triangle; the nearest gap is 1.00e-1, and no crack\n"
     );
 }
 

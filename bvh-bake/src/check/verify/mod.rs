@@ -13,6 +13,7 @@ mod by_value;
 mod input;
 mod second_reading;
 mod surfaces;
+mod welded;
 
 use crate::check::prove::{prove_bounds, validate_in_parallel};
 use crate::error::BakeError;
@@ -34,6 +35,7 @@ use input::{InMemory, Input};
 use second_reading::SecondReading;
 use std::path::{Path, PathBuf};
 use surfaces::Surfaces;
+use welded::WeldedInput;
 
 /// The figures of a successful verification.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +48,8 @@ pub struct VerifyReport {
     pub objects: u64,
     /// Whether triangles were matched by their ids (true) or compared as multisets (false).
     pub by_id: bool,
-    /// The largest distance between a corner of the mesh and the place where it is stored, in mesh units.
+    /// The largest distance between a corner of the mesh and the place where it is stored, in mesh units. For a welded file, the
+    /// largest move of the weld plus the largest move after it. A move to the nearest multiple of 2^-180 does not count.
     pub max_move: f64,
     /// How much wider decoded bounds are than the tight ones.
     pub inflation: Inflation,
@@ -100,7 +103,7 @@ impl VerifyError {
 ///
 /// - the file is valid, and every bound contains what is below it;
 /// - the triangles are those of the mesh, and any that are not stored are exact duplicates of stored ones;
-/// - no corner has moved farther than the file states;
+/// - no corner has moved farther than the file states, and each went where a weld takes it if the file's provenance states one;
 /// - the file states correctly which surfaces of the mesh are closed;
 /// - the instances are those of the mesh.
 ///
@@ -233,13 +236,14 @@ where
             check_counts(object, own, all)?;
             self.check_hull(object)?;
         }
-        let mut surfaces = Surfaces::new(layout, source, resources)?;
-        let (max_move, duplicates) = if layout.has_ids() {
-            self.compare_by_id(&input, &mut surfaces, resources)?
-        } else {
-            self.compare_by_value(&input, &mut surfaces, resources)?
+        let (max_move, duplicates) = match welded::stated(layout, source)? {
+            (_, 0.0) => self.compare_triangles(&input, resources)?,
+            stated => {
+                let welded = WeldedInput::new(&input, stated, layout, resources)?;
+                let (max_move, duplicates) = self.compare_triangles(&welded, resources)?;
+                (welded.moved + max_move, duplicates)
+            }
         };
-        surfaces.compare(source)?;
         Ok(VerifyReport {
             triangles: layout.objects.iter().map(|object| object.triangles()).sum(),
             duplicates,
@@ -248,6 +252,23 @@ where
             max_move,
             inflation,
         })
+    }
+
+    /// Compares the triangles of a file and a mesh, and what the file states about surfaces. Returns the largest move of a corner, and
+    /// the number of duplicates.
+    fn compare_triangles(
+        &self,
+        input: &impl Input,
+        resources: &Resources,
+    ) -> Result<(f64, u64), VerifyError> {
+        let mut surfaces = Surfaces::new(self.layout, self.source, resources)?;
+        let compared = if self.layout.has_ids() {
+            self.compare_by_id(input, &mut surfaces, resources)?
+        } else {
+            self.compare_by_value(input, &mut surfaces, resources)?
+        };
+        surfaces.compare(self.source)?;
+        Ok(compared)
     }
 
     /// Checks that a file has the instances of the mesh, in their order.

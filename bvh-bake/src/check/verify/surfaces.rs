@@ -127,7 +127,7 @@ impl Surfaces {
         }
         let duplicates = duplicates.finish();
         let mut duplicates = Ahead::of(&duplicates)?;
-        for (number, topology) in (0..).zip(&stated).filter(|(_, topology)| topology.closed) {
+        for (number, topology) in (0..).zip(&stated) {
             topology.visit_nets(source, |listed| {
                 let found = Some((listed.place.get(), i64::from(listed.net.get())));
                 differ(number, next_net(&mut duplicates, number)?, found)

@@ -9,6 +9,7 @@ mod mesh;
 mod scene;
 mod solids;
 mod vertex_counter;
+pub(crate) mod weld;
 
 pub(crate) use input_order::InputOrder;
 pub(crate) use scene::SceneFaces;
@@ -382,12 +383,14 @@ impl<'a> Gatherer<'a> {
     }
 
     /// Returns all objects with triangles, ready to be baked. `grid_error` returns the largest move that quantisation
-    /// may make, given the name of the object and the diagonal of its box; `None` leaves vertices as they are.
+    /// may make, given the name of the object and the diagonal of its box; `None` leaves vertices as they are. Vertices are welded
+    /// within the distance `weld` first, unless it is 0.
     pub(crate) fn finish(
         self,
+        weld: f64,
         grid_error: impl Fn(&str, f64) -> Result<Option<f64>, BakeError>,
     ) -> Result<Vec<Gathered>, BakeError> {
-        let Self { names, bodies, spill, split, .. } = self;
+        let Self { resources, names, bodies, spill, split, .. } = self;
         let mut names = names.into_iter().filter(|(_, counts)| *counts).map(|(name, _)| name);
         let mut gathered = Vec::new();
         for mut body in bodies.into_iter().filter(|body| body.count > 0) {
@@ -400,6 +403,12 @@ impl<'a> Gatherer<'a> {
             let name = names.next().unwrap_or_default();
             // A single object keeps its name; several objects that are joined have no name.
             let name = if split || names.next().is_none() { name } else { String::new() };
+            let mut welded = 0.0;
+            if weld::check(weld, &name, body.extent.diagonal())? {
+                let made = weld::weld(body.parts, &body.extent, body.is_cloud, weld, resources, &spill)?;
+                (body.parts, body.extent, body.is_cloud) = (made.parts, made.extent, made.is_cloud);
+                welded = made.moved;
+            }
             let placement = match grid_error(&name, body.extent.diagonal())? {
                 Some(error) => Placement::quantized(&body.extent, error),
                 None => Placement::of(predict(&body.parts, &body.extent)?),
@@ -415,6 +424,7 @@ impl<'a> Gatherer<'a> {
                 behind: placement.behind(),
                 stream,
                 moved: moved.joined(body.moved),
+                welded,
                 vertices: body.vertices,
                 is_cloud: body.is_cloud,
             });

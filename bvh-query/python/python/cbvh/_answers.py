@@ -259,6 +259,51 @@ class SelfContacts(NamedTuple):
     total: int
 
 
+class OpenEdge(NamedTuple):
+    """An edge that leaves an object open.
+
+    - ``kind``: "boundary", "flipped" or "crowded", as in `OpenEdges`.
+    - ``object``: the number of the object in the file.
+    - ``triangles``: the ids of its triangles, or their places in a file without ids: at most four, the smallest numbers.
+    - ``ends``: in the direction in which more triangles traverse the edge, in mesh units, shape (2, 3).
+    - ``gap``: for an edge of one triangle, how near another open edge is; None if that is not known.
+    """
+
+    kind: str
+    object: int
+    triangles: NDArray[np.uint32]
+    ends: Floats
+    gap: float | None
+
+
+class OpenEdges(NamedTuple):
+    """Why a mesh is not closed. ``str()`` says it in a sentence, with the remedy.
+
+    - ``boundary``: the number of edges of one triangle: the border of a hole, of a sheet, or of a crack.
+    - ``flipped``: the number of edges of two triangles that face opposite ways.
+    - ``crowded``: the number of edges of more than two triangles, which do not cancel.
+    - ``edges``: the first eight of each kind, a list of `OpenEdge`.
+    - ``nearest_gap``: the least gap. The gap of an edge of one triangle is the distance within which `bake` with ``weld`` may make it one
+      with another open edge, in mesh units.
+    - ``cracks``: the number of edges whose gap is less than a hundredth of their length.
+    - ``widest_crack``: the greatest gap of a crack; None without cracks.
+    - ``proposed_weld``: a distance for ``weld`` that should close all cracks; None if there is none.
+    """
+
+    boundary: int
+    flipped: int
+    crowded: int
+    edges: list[OpenEdge]
+    nearest_gap: float | None
+    cracks: int
+    widest_crack: float | None
+    proposed_weld: float | None
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
 class MotionAnswer(NamedTuple):
     """Whether a path is free, and where it ends if it is not. After N questions, each field has N elements or rows.
 

@@ -23,6 +23,7 @@ def _options(
     triangles: str | None,
     max_error: float | None,
     round: str | None,
+    weld: float,
     effort: str | None,
     ids: bool,
     topology: bool,
@@ -43,6 +44,10 @@ def _options(
             raise ValueError(f'max_error: expected triangles="quantized" beside it, found {triangles!r}')
         if not 0 < max_error < np.inf:
             raise ValueError(f"max_error: expected a finite length above 0, found {max_error}")
+    if isinstance(weld, (str, bytes)) or not hasattr(weld, "__float__"):
+        raise TypeError(f"weld: expected a number, found {type(weld).__name__}")
+    if not 0 <= float(weld) < np.inf:
+        raise ValueError(f"weld: expected a finite length of at least 0, found {weld}")
     if isinstance(radius, (str, bytes)) or not hasattr(radius, "__float__"):
         raise TypeError(f"radius: expected a number, found {type(radius).__name__}")
     if not 0 <= float(radius) <= 2.0**118:
@@ -52,6 +57,7 @@ def _options(
         "triangles": triangles,
         "max_error": max_error,
         "round": round,
+        "weld": float(weld),
         "effort": effort,
         "ids": bool(ids),
         "topology": bool(topology),
@@ -75,6 +81,7 @@ def bake(
     triangles: str | None = None,
     max_error: float | None = None,
     round: str | None = None,
+    weld: float = 0.0,
     effort: str | None = None,
     ids: bool = True,
     topology: bool = True,
@@ -85,6 +92,8 @@ def bake(
 
     ``vertices`` have shape (V, 3), in any unit of length; ``faces`` have shape (F, 3), three numbers of vertices each.
     ``profile``, ``triangles``, ``max_error`` and ``effort`` are those of ``cbvh bake``; None lets the baker choose.
+    ``weld`` closes seams that are open by rounding errors: each vertex goes to the position of the first vertex within this
+    distance of it, in mesh units. Triangles that lose their area stay. BakeError if it exceeds the diagonal of the mesh's box.
     Without ``ids``, the baker numbers triangles in its own order. Without ``topology``, there are no answers about what
     is inside. ``radius`` and ``solid`` are those of `Mesh.rounded` and `Mesh.solid`, and stay in the file. Baking takes
     about a microsecond per triangle. `Mesh.save` writes the result. ``round="f32"`` rounds each coordinate to the nearest float32
@@ -107,7 +116,7 @@ def bake(
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(points):
         found = f"{numbers.min()} to {numbers.max()}"
         raise ValueError(f"faces: expected numbers from 0 to {len(points) - 1}, found {found}")
-    options = _options(profile, triangles, max_error, round, effort, ids, topology, radius, solid)
+    options = _options(profile, triangles, max_error, round, weld, effort, ids, topology, radius, solid)
     return Mesh(_cbvh.bake(points, np.require(numbers, np.uint32, ["C", "ALIGNED"]), options))
 
 
@@ -119,6 +128,7 @@ def bake_files(
     triangles: str | None = None,
     max_error: float | None = None,
     round: str | None = None,
+    weld: float = 0.0,
     effort: str | None = None,
     ids: bool = True,
     topology: bool = True,
@@ -145,7 +155,7 @@ def bake_files(
     files = [os.fsdecode(file) for file in inputs]
     if not files:
         raise ValueError("inputs: expected at least one file, found none")
-    options = _options(profile, triangles, max_error, round, effort, ids, topology, radius, solid, drop_nan)
+    options = _options(profile, triangles, max_error, round, weld, effort, ids, topology, radius, solid, drop_nan)
     if max_memory is not None:
         try:
             max_memory = operator.index(max_memory)

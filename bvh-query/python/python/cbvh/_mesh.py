@@ -17,6 +17,8 @@ from ._answers import (
     Floats,
     MotionAnswer,
     MotionKind,
+    OpenEdge,
+    OpenEdges,
     Penetration,
     RayHit,
     Relation,
@@ -392,6 +394,19 @@ class Mesh:
         """
         triangles, kind, total = _cbvh.self_contacts(self._mesh, limit)
         return SelfContacts(triangles, named(SelfContactKind, kind), total)
+
+    def open_edges(self) -> OpenEdges:
+        """The edges that leave the mesh open, so that questions about what is inside have no answer; none if it is closed.
+
+        Duplicates count with their orientation. Cost: about a third of a second per million triangles of an open mesh at
+        the first call. Raises ValueError if the mesh was baked without topology.
+        """
+        [boundary, flipped, crowded, cracks], [nearest, widest, weld], listed, text = self._mesh.open_edges()
+        edges = [
+            OpenEdge(kind, number, np.array(triangles, np.uint32), np.array(ends), gap)
+            for kind, number, triangles, ends, gap in listed
+        ]
+        return OpenEdges(boundary, flipped, crowded, edges, nearest, cracks, widest, weld, text)
 
     def motion(
         self,

@@ -125,7 +125,10 @@ fn a_body_without_an_inside_cannot_be_solid() {
     let mut robot = without_own_pairs();
     robot.add_obstacle("tent", tent(), &Pose::IDENTITY).unwrap();
     let error = robot.make_solid("tent").unwrap_err();
-    assert!(matches!(error, RobotError::NotSolid { source: QueryError::NotClosed(0), .. }), "{error}");
+    assert!(
+        matches!(error, RobotError::NotSolid { source: QueryError::NotClosed { object: 0, .. }, .. }),
+        "{error}"
+    );
     assert!(error.to_string().starts_with("tent: expected closed objects"), "{error}");
     assert!(matches!(robot.make_solid("nothing"), Err(RobotError::Unknown { .. })));
     robot.remove("tent").unwrap();

@@ -5,7 +5,7 @@ use crate::file::shape::Shape;
 use crate::pose::Pose;
 use crate::query::answers::{Distance, Relation};
 use crate::query::depth::balls::bounds;
-use crate::query::depth::penetration::{Penetration, PenetrationOptions, check_closed};
+use crate::query::depth::penetration::{Penetration, PenetrationOptions};
 use crate::query::displacement::{displacement, size};
 use crate::query::exact::{placed, stored_at};
 use crate::query::options::check;
@@ -202,10 +202,7 @@ impl Querier {
             let (inner, outer) = if relation == Relation::AInB { (&own, &other) } else { (&other, &own) };
             return Ok(clash(ClashClass::Contained, self.first_inside(inner, outer)?.unwrap_or_default()));
         }
-        let has_depth = match check_closed(a, b) {
-            Err(QueryError::NotClosed(_)) => false,
-            is_closed => is_closed.map(|()| true)?,
-        };
+        let has_depth = a.is_closed()? && b.is_closed()?;
         if is_disjoint {
             let (distance, point) = self.gap(a, b, pose)?;
             let depth = has_depth.then_some(Penetration { point, ..Penetration::APART });

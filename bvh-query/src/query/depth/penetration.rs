@@ -406,7 +406,8 @@ impl Penetration {
 
 /// Refuses shapes without an inside.
 pub(crate) fn check_closed(a: Shape<'_>, b: Shape<'_>) -> Result<(), QueryError> {
-    a.solid().and(b.solid()).map(drop)
+    a.check_closed()?;
+    b.check_closed()
 }
 
 /// Returns a point near one of a triangle's, some way towards its centre and a quarter of that inwards.

@@ -19,6 +19,7 @@ import { distinct, heat } from "./colours.js";
 import { countOf, fact, fill, h, milliseconds } from "./dom.js";
 import { describe, messageOf } from "./errors.js";
 import type { Look } from "./look.js";
+import { Open } from "./open.js";
 import type { Pair } from "./pair.js";
 import { part } from "./panel.js";
 import type { View } from "./view.js";
@@ -71,6 +72,7 @@ export class Inside {
     readonly #visitsBox = h("div");
     readonly #nodesBox = h("div", { class: "muted" });
     readonly #group = new Group();
+    readonly #open: Open;
     #polyhedra: Polyhedra | undefined;
     #known = new Map<number, Contents>();
     #visits: Visits | undefined;
@@ -84,6 +86,7 @@ export class Inside {
         readonly look: Look,
     ) {
         view.stage.scene.add(this.#group);
+        this.#open = new Open(view);
         this.#page = view.panel.add("inside", "Inside", (shown) => {
             this.#isShown = shown;
             this.#group.visible = shown;
@@ -111,6 +114,7 @@ export class Inside {
                 this.#nodesBox,
             ),
             part("Colours of triangles", row("by", this.#paint), this.#visitsBox),
+            this.#open.element,
             this.#contents,
         );
     }
@@ -130,6 +134,7 @@ export class Inside {
     /** Adopts the files on the stage. */
     offer(): void {
         this.#known.clear();
+        this.#open.forget();
         this.#visits = undefined;
         this.#clearNodes();
         const bodies = this.view.bodies;
@@ -154,6 +159,7 @@ export class Inside {
 
     async #show(): Promise<void> {
         if (!this.#isShown) {
+            this.#open.hide();
             this.#try(() => this.#repaint());
             return;
         }
@@ -165,6 +171,7 @@ export class Inside {
             const known = this.#known.get(body.file) ?? (await this.view.asker.ask("contents", body.file));
             this.#known.set(body.file, known);
             this.#showContents(body, known);
+            await this.#open.show(body);
             await this.#drawLevel();
             await this.#repaint();
         } catch (error) {
@@ -214,6 +221,7 @@ export class Inside {
         if (body !== undefined) {
             this.view.stage.place(this.#group, body.pose, body.shown.centre);
         }
+        this.#open.place();
     }
 
     async #drawLevel(): Promise<void> {

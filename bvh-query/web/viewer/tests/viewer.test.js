@@ -327,6 +327,36 @@ test("meshes that are not closed have no depth, and the page says which", { skip
     }
 });
 
+test("the edges that leave a mesh open are listed and drawn", { skip: WITHOUT }, async () => {
+    const holed = baked("holed.obj", ring(64, 32).replace(/^f .*\n/m, ""));
+    const { page, errors, close } = await open(filled([["holed.cbvh", holed]], { kind: "file" }));
+    await page.click("#tab-inside");
+    const part = page.locator("#page-inside .part", { hasText: "Open edges" });
+    await part.locator("text=3 edges have one triangle").waitFor();
+    const told = JSON.parse(command("validate", path.join(folder, "holed.obj.cbvh"), "--json")).open_edges;
+    const cells = await part.locator("tbody tr").evaluateAll((rows) => rows.map((row) => row.cells[2].textContent));
+    assert.deepEqual(
+        cells,
+        told.boundary.first.map(({ triangles }) => triangles.join(", ")),
+    );
+    // Lines and dots are on the stage while the tab is shown, and only then.
+    const stage = () => page.locator("canvas").first().screenshot();
+    const drawn = await stage();
+    await page.click("#tab-probes");
+    const without = await stage();
+    await page.click("#tab-inside");
+    await part.locator("text=3 edges have one triangle").waitFor();
+    assert.ok(!drawn.equals(without) && drawn.equals(await stage()));
+    assert.deepEqual(errors, []);
+    await close();
+    // A closed mesh has no such list.
+    const other = await open(filled([["ring.cbvh", RING()]], { kind: "file" }));
+    await other.page.click("#tab-inside");
+    await other.page.waitForSelector("#page-inside dl.facts");
+    assert.equal(await other.page.locator("text=Open edges").count(), 0);
+    await other.close();
+});
+
 test("a motion has its certain time and its hit, as the command says", { skip: WITHOUT }, async () => {
     const end = [...BESIDE];
     end[3] = -4.5;

@@ -40,6 +40,7 @@ const handlers = {
     bytes: (file: number) => files.file(file).mesh.bytes(),
     triangles: (file: number) => files.file(file).triangles(),
     place: (file: number, triangle: number) => files.file(file).place(triangle),
+    openEdges: (file: number) => files.file(file).mesh.openEdges(),
     validate: (file: number) => files.file(file).mesh.validate(),
     packets: (file: number) => files.file(file).packetNumbers(),
 
