@@ -2,7 +2,7 @@
 //!
 //! Filters need no more than an offset. A coordinate follows from it by a predictor and a corrector, as slabs do. The
 //! predictor of an axis is a rule that gives back what people write: numbers that are `f32`, decimals of a few digits, and
-//! `f32` numbers times a scale. What it misses is corrected by integers beside the packets ([`Corrections`]). A writer takes a
+//! `f32` numbers times a scale. What it misses is corrected by integers beside the packets (`leaf/corrections`). A writer takes a
 //! predictor only because the function here, [`Vertices::coordinate`], returns the bits of the coordinate.
 //!
 //! All operations are rounded to nearest, and none is fused, so that every machine finds the same bits. Section 15.1 of

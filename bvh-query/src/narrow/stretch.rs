@@ -31,7 +31,7 @@ pub(crate) struct Way {
     pub(crate) direction: Point,
     /// A bound of the way: stretches are valid as far as this in both directions.
     pub(crate) length: f64,
-    /// A bound on the error of each coordinate of the triangle that moves.
+    /// A bound on how far rounding moves each coordinate of the triangle that moves, from where the way takes it.
     pub(crate) error: f64,
 }
 

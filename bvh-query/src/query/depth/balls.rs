@@ -146,7 +146,7 @@ impl Querier {
             let scale = length(normal).max(f64::MIN_POSITIVE);
             normal.map(|x| -x / scale)
         });
-        let mut step = line.length / 16.0;
+        let mut step = line.size / 8.0;
         for _ in 0..10 {
             let centre = [0, 1, 2].map(|k| point[k] + step * (inwards[0][k] + inwards[1][k]));
             balls.take(centre, self.depths(&a, &b, &centre)?);

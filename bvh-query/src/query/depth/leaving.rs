@@ -72,7 +72,7 @@ impl Querier {
         }
         self.queue.clear();
         self.start_placed();
-        let way = Way { direction: line.direction, length: line.length, error: line.error };
+        let way = Way { direction: line.direction, length: line.length, error: line.placing };
         let visit = &mut |pair: TrianglePair| {
             let a = placed.triangle_a(pair.a, pair.lane_a)?;
             let b = placed.triangle_b(pair.b, pair.lane_b)?;
@@ -203,7 +203,7 @@ mod tests {
             };
             let line = Line::new(a.all(), b.all(), &pose).along(direction);
             let at = 0.1 * random.unit();
-            let way = Way { direction, length: line.length, error: line.error };
+            let way = Way { direction, length: line.length, error: line.placing };
             let mut expected = Leaving {
                 crosses_until: 0.0,
                 touches_until: None,

@@ -3,7 +3,7 @@
 //! ```text
 //! at := 0, or what is known to be covered; while at < limit:
 //!     if pairs of triangles certainly cross at `at`: go on to where the last of them has left
-//!     else if the shapes are apart a few roundings after the last contact at `at`: that place is free
+//!     else if the shapes are apart a few roundings around where the last contact at `at` leaves: that place is free
 //!     else if interiors certainly meet for some way: go on by that
 //!     else go on to where the last contact has left, and some roundings more each time
 //! ```
@@ -16,10 +16,11 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
+use crate::narrow::{Point, Triangle, UNIT_ROUNDOFF, dot, subtract, triangle_distance};
 use crate::pose::Pose;
 use crate::query::answers::{Distance, Relation};
 use crate::query::depth::leaving::Leaving;
+use crate::query::motion::radius;
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
 use crate::traverse::placement::POSE_ERROR;
@@ -34,10 +35,14 @@ pub(super) struct Line<'a> {
     pub(super) direction: Point,
     /// More than B has to move until its box is beyond A's.
     pub(super) length: f64,
+    /// The extents of both boxes, which steps of searches begin from.
+    pub(super) size: f64,
     /// The sum of the radii.
     pub(super) radii: f64,
-    /// A bound on the error of placed coordinates.
+    /// A bound on the error of distances between the shapes.
     pub(super) error: f64,
+    /// A bound on how far rounding moves a coordinate of B from where a move from another place on the line would take it.
+    pub(super) placing: f64,
     /// The size of the smaller triangles, about.
     pub(super) grain: f64,
 }
@@ -62,9 +67,15 @@ pub(super) struct LastContact {
     pub(super) triangles: [Triangle; 2],
 }
 
-/// The steps beyond the last contact at which a place is tried, in errors of a coordinate. These are bounds: what rounds is
-/// hundreds of times nearer, most of the time.
-const STEPS: [f64; 6] = [0.0, 1.0 / 64.0, 1.0 / 8.0, 1.0, 8.0, 64.0];
+/// With u for 2^-53, both places of a coordinate take 3 u of how far the corner is from B's origin, u of the sum with the
+/// translation, u of the translation, and 2 u of the way in it, which is a product with a sum. That is at most 8 u of the distance, the
+/// first translation and the length of the way, which has a percent to spare.
+const PLACING_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
+
+/// The places that are tried: before a contact has certainly left, by parts of what is charged for roundings there, and after it,
+/// in errors of placing.
+const PARTS: [f64; 2] = [7.0 / 8.0, 1.0 / 2.0];
+const STEPS: [f64; 3] = [0.0, 8.0, 64.0];
 
 /// The number of points that are tried to find one that is inside both shapes.
 const COMMON_POINTS: u32 = 64;
@@ -75,13 +86,15 @@ const MANY_TRIANGLES: f64 = 8.0;
 const GROWTH: f64 = 1.5;
 const FEW_CROSSINGS: f64 = 4.0;
 
-/// The part of a way by which a common point has to bring it on.
-const LEAST_PART: f64 = 1e-7;
+/// The part of the size by which a common point has to bring a way on.
+const LEAST_PART: f64 = 2e-7;
 
 impl<'a> Line<'a> {
     pub(super) fn new(a: Shape<'a>, b: Shape<'a>, pose: &'a Pose) -> Self {
         let radii = sum_of_radii(a, b);
         let (mut size, mut magnitude, mut grain) = (radii, 0.0, f64::INFINITY);
+        // Boxes that overlap are apart after a move by both diagonals, and radii count on both sides.
+        let mut length = 2.0 * radii;
         for shape in [a, b] {
             let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
             for object in shape.objects() {
@@ -93,12 +106,16 @@ impl<'a> Line<'a> {
             }
             let extent = (0..3).map(|k| hi[k] - lo[k]).sum::<f64>();
             size += extent;
+            length += (0..3).map(|k| (hi[k] - lo[k]).powi(2)).sum::<f64>().sqrt();
             grain = grain.min(extent / (shape.triangles() as f64).sqrt());
         }
         magnitude += pose.translation().iter().map(|t| t.abs()).sum::<f64>();
         // Never 0, so that each turn of a search goes on, even for two points in one place.
         let error = (POSE_ERROR * (magnitude + size)).max(f64::MIN_POSITIVE);
-        Self { a, b, pose, direction: [0.0; 3], length: 2.0 * size, radii, error, grain }
+        let length = 1.01 * length;
+        let farthest = pose.translation().iter().fold(0.0f64, |most, t| most.max(t.abs())) + length;
+        let placing = (PLACING_ERROR * (radius(b.objects()) + farthest)).max(f64::MIN_POSITIVE);
+        Self { a, b, pose, direction: [0.0; 3], length, size, radii, error, placing, grain }
     }
 
     pub(super) fn along(self, direction: Point) -> Self {
@@ -117,6 +134,13 @@ impl<'a> Line<'a> {
         let moved = |by: f64| b.map(|corner| [0, 1, 2].map(|k| corner[k] + by * self.direction[k]));
         let point = triangle_distance(&a, &moved(until)).point_a;
         Some(LastContact { normal: leaving.normal, point, triangles: [a, moved(-at)] })
+    }
+
+    /// Returns about what [`stretch`](crate::narrow::stretch) charges for roundings where a contact leaves through a facet.
+    fn charge(&self, normal: Point) -> f64 {
+        let magnitude = normal[0].abs() + normal[1].abs() + normal[2].abs();
+        let rate = dot(normal, self.direction).max(f64::MIN_POSITIVE);
+        magnitude * (self.placing + 16.0 * UNIT_ROUNDOFF * self.length) / rate
     }
 
     /// Returns the pose of B at a place.
@@ -180,21 +204,27 @@ impl Querier {
             let leaving = self.leaving(line, at)?;
             let touches = leaving.touches_until.is_some();
             last = if touches { line.last_contact(at, &leaving) } else { last };
-            if leaving.crosses_until > line.error {
+            if leaving.crosses_until > line.placing {
                 at += leaving.crosses_until;
                 least = FEW_CROSSINGS * leaving.crosses_until;
                 continue;
             }
             let until = at + leaving.touches_until.unwrap_or(0.0);
-            let mut places = STEPS.map(|step| until + step * stuck * line.error);
+            let charge = line.charge(leaving.normal);
+            let [near, nearer] = PARTS.map(|part| (until - part * charge).max(at));
+            let [first, second, third] = STEPS.map(|step| until + step * stuck * line.placing);
+            let mut places = [near, nearer, first, second, third];
             if line.radii > 0.0
                 && let Some(gap) = self.gap_of_cores(line, at)?
             {
                 last = Some(gap.contact(line, at));
                 places[0] = at + gap.way_out(line);
             }
+            let mut tried = f64::NAN;
             for place in places.into_iter().filter(|&place| place < limit) {
-                if self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart {
+                if place != std::mem::replace(&mut tried, place)
+                    && self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart
+                {
                     return Ok(Some(Free { at: place, last }));
                 }
             }
@@ -202,7 +232,7 @@ impl Querier {
             (at, stuck) = if way > 0.0 {
                 (at + way, 1.0)
             } else {
-                (until + STEPS[STEPS.len() - 1] * stuck * line.error, 4.0 * stuck)
+                (until + STEPS[STEPS.len() - 1] * stuck * line.placing, 4.0 * stuck)
             };
         }
         Ok(None)
@@ -213,7 +243,7 @@ impl Querier {
         let mut covered = 0.0;
         while covered < end {
             let leaving = self.leaving(line, covered)?;
-            let way = if leaving.crosses_until > line.error {
+            let way = if leaving.crosses_until > line.placing {
                 leaving.crosses_until
             } else {
                 self.common_way(line, covered, leaving.touches_until.is_some())?
@@ -242,7 +272,7 @@ impl Querier {
     /// touches and neither has a radius, one shape or a part of it is inside the other, and stays there until the gap is closed.
     fn common_way(&mut self, line: &Line<'_>, at: f64, touches: bool) -> Result<f64, QueryError> {
         let pose = line.pose_at(at);
-        let is_enough = |way: &f64| *way > LEAST_PART * line.length;
+        let is_enough = |way: &f64| *way > LEAST_PART * line.size;
         if !touches && let Some(gap) = self.gap_of_cores(line, at)? {
             let way = if line.radii > 0.0 {
                 line.radii - gap.distance
