@@ -1,6 +1,6 @@
 """Makes `cases/*.jsonl`: chooses meshes, poses and points, and states the truth that the first way gives. `check.py` proves it again.
 
-    python make_cases.py [--jobs N]
+    python make_cases.py [--jobs N] [--files NAMES]
 
 Everything comes from seeds and integers, so that the same files come out on every machine.
 """
@@ -13,6 +13,7 @@ from math import nextafter
 from multiprocessing import Pool
 from pathlib import Path
 
+import decimals
 import exact
 import meshes
 import prove
@@ -92,6 +93,24 @@ BROKEN = {
 MAX_INLINE = 40
 
 
+def quarter_turns():
+    """Returns the 24 rotations of a cube, as rows of matrices."""
+    found = []
+    for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
+        for signs in range(8):
+            rows = [[(1 - 2 * (signs >> i & 1)) if j == order[i] else 0 for j in range(3)] for i in range(3)]
+            if truth.dot(rows[0], truth.cross(rows[1], rows[2])) == 1:
+                found.append(tuple(x for row in rows for x in row))
+    return found
+
+
+QUARTER_TURNS = quarter_turns()
+IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
+PAIRS = [decimals.Pair(number, [IDENTITY, *(turn for turn in QUARTER_TURNS if turn != IDENTITY)]) for number in range(decimals.COUNT)]
+# The numbers of the pairs that are also one mesh, for questions about itself, and of those whose A is asked about points and lines.
+SELF, PROBED = range(0, decimals.COUNT, 5), range(0, decimals.COUNT, 4)
+
+
 def kept(file):
     """Returns the lines of a file of cases as they are."""
     return [json.loads(line) for line in (CASES / file).read_text(encoding="utf-8").splitlines()]
@@ -114,28 +133,18 @@ def mesh_records():
     for name, (vertices, triangles) in {**BROKEN, "empty": ([], [])}.items():
         record = {"mesh": name, "triangle_count": len(triangles), "vertices": vertices, "triangles": triangles}
         records[name] = record | {"sha256": meshes.content_hash(vertices, triangles)}
-    return records | {record["mesh"]: record for record in kept("meshes.jsonl") if record["mesh"].startswith("hard-")}
+    records |= {record["mesh"]: record for record in kept("meshes.jsonl") if record["mesh"].startswith("hard-")}
+    for pair in PAIRS:
+        made = {"a": pair.a, "b": pair.b} | ({"both": pair.both} if pair.number in SELF else {})
+        for of, (points, triangles) in made.items():
+            vertices, triangles = [[to_hex(x) for x in p] for p in points], [list(t) for t in triangles]
+            record = {"mesh": pair.name(of), "triangle_count": len(triangles), "vertices": vertices, "triangles": triangles}
+            records[record["mesh"]] = record | {"sha256": meshes.content_hash(vertices, triangles)}
+    return records
 
 
 RECORDS = mesh_records()
 MESHES = {name: meshes.load(record) for name, record in RECORDS.items()}
-IDENTITY = (1, 0, 0, 0, 1, 0, 0, 0, 1)
-
-
-def quarter_turns():
-    """Returns the 24 rotations of a cube, as rows of matrices."""
-    found = []
-    for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
-        for signs in range(8):
-            rows = [[(1 - 2 * (signs >> i & 1)) if j == order[i] else 0 for j in range(3)] for i in range(3)]
-            if truth.dot(rows[0], truth.cross(rows[1], rows[2])) == 1:
-                found.append(tuple(x for row in rows for x in row))
-    return found
-
-
-QUARTER_TURNS = quarter_turns()
-
-
 def turn(quaternion):
     """Returns the rotation of an integer quaternion with each entry rounded to a multiple of 2^-40."""
     w, x, y, z = quaternion
@@ -237,6 +246,20 @@ def kind(name):
     return (() if convex else ("concave",)) + (("overlapping parts",) if parts else ())
 
 
+@lru_cache(maxsize=None)
+def parts(name):
+    """Returns the triangles of each connected part of a mesh, on a grid of its own."""
+    (points,), _ = exact.to_grid(corners(name))
+    return truth.components(prove.gather(points, MESHES[name][1]))
+
+
+def has_depth(name):
+    """Tells whether a mesh is closed and its connected parts are convex, as the proofs of depths demand."""
+    of = parts(name)
+    convex = all(truth.dot(truth.normal(t), truth.sub(p, t[0])) <= 0 for part in of for t in part for u in part for p in u)
+    return convex and all(truth.is_closed(part) for part in of) and "overlapping parts" not in kind(name)
+
+
 def is_nested(case, item):
     """Tells whether a part of a closed mesh is inside the other one and touches nothing, where a solid would answer otherwise."""
     if prove.fault(case, MESHES, item) or any("open" in kind(case[k]) or not MESHES[case[k]][1] for k in ("a", "b")):
@@ -285,7 +308,7 @@ def state(case):
     if not items:
         return None
     refused = items[0]["truth"] == "refused"
-    has_parts = case["ask"] == "penetration" and {case["a"], case["b"]} & set(GROUPS)
+    has_parts = case["ask"] == "penetration" and any(len(parts(case[k])) > 1 for k in ("a", "b"))
     case["proof"] = PROOFS["refused" if refused else "penetration of parts" if has_parts else case["ask"]]
     case["needs"] = needs(case)
     return case
@@ -608,13 +631,44 @@ def make_self_contacts(maker):
     maker.add("self", "self_contacts", ("soup-200",), [{}], "pairs of triangles of one mesh that share more than their common corners", ("self",), 2)
 
 
+def make_decimals(maker):
+    for pair in PAIRS:
+        names, writing = (pair.name("a"), pair.name("b")), ("decimals", "noise" if pair.is_noisy else "written")
+        poses = [[to_hex(float(x)) for x in pair.pose(shift)] for shift in pair.shifts()]
+        maker.pairs("decimals", names, poses, pair.reason, writing, 2)
+        # The way out of a slot that a plate hardly overfills is far, and to prove that takes cubes as small as the overlap.
+        is_jammed = pair.change < 0 and any(len(parts(name)) > 1 for name in names)
+        if all(map(has_depth, names)) and not is_jammed:
+            maker.add("decimals", "penetration", names, [{"pose": pose} for pose in poses], pair.reason, (*writing, "penetration"), 2)
+        items = [{key: [to_hex(float(x)) for x in pair.pose(shift)] for key, shift in zip(("start", "end"), shifts)} for shifts in pair.motions()]
+        if items:
+            maker.add("decimals", "motion", names, items, pair.reason, (*writing, "motion"), 2)
+        if pair.number in SELF:
+            maker.add("decimals", "self_contacts", (pair.name("both"),), [{}], f"{pair.reason}, as one mesh", (*writing, "self"), 2)
+        if pair.number in PROBED:
+            for ask, items in probes_of(pair).items():
+                maker.add("decimals", ask, names[:1], items, f"corners, edges and faces of mesh A: {pair.reason}", (*writing, ask), 2)
+
+
+def probes_of(pair):
+    """Returns questions about points and lines at the first mesh of a pair."""
+    asked = {"closest": [{"point": hexes(p)} for p in pair.points()], "side": [{"point": hexes(p)} for p in pair.points()], "ray": [], "segment": []}
+    for origin, direction, target in pair.lines():
+        asked["ray"].append({"origin": hexes(origin), "direction": hexes(direction)})
+        asked["segment"].append({"from": hexes(origin), "to": hexes(target)})
+    return asked
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--jobs", type=int, default=2)
-    jobs = parser.parse_args().jobs
+    parser.add_argument("--files", default="", help="make only these files of cases, separated by commas, and the meshes")
+    arguments = parser.parse_args()
+    jobs, files = arguments.jobs, set(filter(None, arguments.files.split(",")))
     maker = Maker()
-    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_grazing, make_slides, make_depths_of_parts, make_self_contacts):
+    for make in (make_pairs, make_nested, make_surfaces, make_hostile, make_refused, make_hard, make_probes, make_motions, make_depths, make_grazing, make_slides, make_depths_of_parts, make_self_contacts, make_decimals):
         make(maker)
+    maker.cases = {file: of for file, of in maker.cases.items() if not files or file in files}
     CASES.mkdir(exist_ok=True)
     cases = [case for of in maker.cases.values() for case in of]
     with Pool(jobs) as pool:
