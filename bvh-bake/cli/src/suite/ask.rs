@@ -4,7 +4,8 @@ use super::meshes::Meshes;
 use super::message::{Number, Question};
 use crate::console::{Record, record};
 use bvh_query::{
-    Motion, MotionAnswer, MotionOptions, PenetrationOptions, Pose, Querier, QueryError, Ray, Relation, Side,
+    Bvh, Motion, MotionAnswer, MotionOptions, PenetrationOptions, Pose, Querier, QueryError, Ray, Relation,
+    Side,
 };
 
 /// The questions that the command answers.
@@ -42,8 +43,12 @@ pub(super) fn ask(question: &Question, meshes: &Meshes, querier: &mut Querier) -
         }
         "within" => yes_or_no(querier.within(a, b()?, &pose()?, number("within", question.within)?))?,
         "relation" => {
-            let answer = match querier.relation(a, b()?, &pose()?).map_err(text)? {
+            let b = b()?;
+            let found = querier.relation(a, b, &pose()?).map_err(text)?;
+            let answer = match found {
                 Relation::Touching => "touching",
+                // The protocol leaves meshes that do not close undefined, also where bvh-query knows better: apart from their boxes.
+                _ if !is_closed(a)? || !is_closed(b)? => "undefined",
                 Relation::Apart => "apart",
                 Relation::AInB => "a in b",
                 Relation::BInA => "b in a",
@@ -103,6 +108,15 @@ pub(super) fn ask(question: &Question, meshes: &Meshes, querier: &mut Querier) -
         other => return Err(format!("expected one of {}, found {other:?}", QUESTIONS.join(", "))),
     };
     Ok(answer)
+}
+
+/// Returns whether all objects of a mesh are closed.
+fn is_closed(mesh: &Bvh) -> Result<bool, String> {
+    let mut all = true;
+    for object in 0..mesh.objects().len() {
+        all &= mesh.is_closed(object).map_err(text)?;
+    }
+    Ok(all)
 }
 
 fn yes_or_no(answer: Result<bool, QueryError>) -> Result<Record, String> {

@@ -40,7 +40,8 @@ impl Meshes {
     }
 }
 
-/// Bakes a mesh. A mesh whose coordinates the file would round is refused, because answers would be about another mesh.
+/// Bakes a mesh. Files store each `f64` that is a multiple of 2^-180; a mesh with a finer coordinate, which the file rounds, is
+/// refused, because answers would be about another mesh.
 fn bake(message: &MeshMessage) -> Result<Bvh, String> {
     let positions = message.vertices.iter().map(|corner| corner.map(f64::from)).collect();
     let mesh = Mesh::from_triangles(positions, message.triangles.clone());

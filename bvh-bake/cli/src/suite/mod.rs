@@ -105,7 +105,7 @@ fn hello() -> Record {
         name: "cbvh",
         version: env!("CARGO_PKG_VERSION"),
         settings: "meshes baked in memory with the default options",
-        coordinates: "f32",
+        coordinates: "f64",
         placement: "f64",
         questions: ask::QUESTIONS,
         timed: ["collide", "distance", "contacts", "touched"],

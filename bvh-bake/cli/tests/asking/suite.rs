@@ -92,14 +92,58 @@ fn every_question_has_its_answer() {
 }
 
 #[test]
+fn coordinates_that_single_precision_does_not_hold_are_answered_exactly() {
+    let box_between = |name: &str, x: [f64; 2]| {
+        let corners: Vec<[f64; 3]> =
+            (0..8).map(|i| [x[i & 1], [0.1, 0.7][i >> 1 & 1], [1e9, 1e9 + 0.3][i >> 2]]).collect();
+        // Two triangles for each side, across z, y and x.
+        let z = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6]];
+        let y = [[0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7]];
+        let x = [[0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]];
+        let triangles = [z, y, x].concat();
+        json!({"mesh": name, "vertices": corners, "triangles": triangles})
+    };
+    let collide =
+        |id: u32, b: &str| json!({"id": id, "ask": "collide", "a": "a", "b": b, "pose": at(0.0, 0.0, 0.0)});
+    let answers = talk(&[
+        json!({"hello": 1}),
+        box_between("a", [-0.2, 0.3]),
+        box_between("touching", [0.3, 0.9]),
+        box_between("apart", [0.3_f64.next_up(), 0.9]),
+        collide(1, "touching"),
+        collide(2, "apart"),
+    ]);
+    assert_eq!(answers[0]["coordinates"], json!("f64"));
+    assert_eq!((&answers[4]["answer"], &answers[5]["answer"]), (&json!(true), &json!(false)));
+}
+
+#[test]
+fn meshes_that_do_not_close_have_no_relation_unless_they_touch() {
+    let triangle =
+        json!({"mesh": "t", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]});
+    let relation = |id: u32, a: &str, b: &str, pose: Value| json!({"id": id, "ask": "relation", "a": a, "b": b, "pose": pose});
+    let answers = talk(&[
+        corner("large", 4.0),
+        triangle,
+        relation(1, "large", "t", at(9.0, 0.0, 0.0)),
+        relation(2, "t", "large", at(9.0, 0.0, 0.0)),
+        relation(3, "large", "t", at(0.5, 0.5, 0.5)),
+        relation(4, "large", "t", at(0.0, 0.0, 0.0)),
+        relation(5, "large", "large", at(9.0, 0.0, 0.0)),
+    ]);
+    let found: Vec<&Value> = answers[2..].iter().map(|answer| &answer["answer"]).collect();
+    assert_eq!(json!(found), json!(["undefined", "undefined", "undefined", "touching", "apart"]));
+}
+
+#[test]
 fn what_has_no_answer_is_refused_and_the_next_line_is_answered() {
     let stretched = json!([2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]);
     let asked = |id: u32, ask: &str, b: &str, pose: Value| json!({"id": id, "ask": ask, "a": "large", "b": b, "pose": pose});
     let refused = [
         json!({"mesh": "broken", "vertices": [["nan", 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [["-inf", 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
-        // The unit of a file, 2^-240, is larger than 1e-80.
-        json!({"mesh": "broken", "vertices": [[1e-80, 0, 0], [1e9, 0, 0.2], [0, 1, 0.3]], "triangles": [[0, 1, 2]]}),
+        // Files store multiples of 2^-180.
+        json!({"mesh": "broken", "vertices": [[1e-60, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [[0, 0, 0]], "triangles": [[0, 1, 2]]}),
         json!({"mesh": "broken", "vertices": [], "triangles": []}),
         asked(1, "collide", "broken", at(0.0, 0.0, 0.0)),
