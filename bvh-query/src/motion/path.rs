@@ -29,7 +29,8 @@ pub trait RigidPath {
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
 
     /// Returns true only if B *slides* between two times: its rotation stays the same, and each coordinate of its translation
-    /// never falls or never rises, in all poses that [`RigidPath::pose`] returns, to the bit.
+    /// never falls or never rises, in all poses that [`RigidPath::pose`] returns, to the bit. The sagitta of each part of the interval
+    /// must be no larger than that of the whole.
     ///
     /// Boxes along the axes of A then bound where B is without any rounding. Questions thereby tell flush parts apart that slide
     /// along each other across a gap of a few roundings. Otherwise they would look at the pose in the middle of each cell.

@@ -457,6 +457,33 @@ fn parts_slide_across_a_gap_of_one_rounding() {
     }
 }
 
+/// At gaps about as wide as a cell reaches, which is anything from half of an eighth of the tolerance to all of it.
+#[test]
+fn slides_at_gaps_about_as_wide_as_cells_reach_take_few_visits() {
+    let block = baked(&cube());
+    let tolerance = MotionOptions::new().tolerance_between(&block, &block);
+    let mut found = [0; 2];
+    for way in [3.0, 4.0, 5.3, 7.9] {
+        for share in [0.4, 0.5, 0.55, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.1] {
+            let gap = 2.0 + share * tolerance / 8.0;
+            let slide = Motion::between(&at(0.3, gap, -way / 2.0), &at(0.3, gap, way / 2.0)).unwrap();
+            for querier in &mut queriers() {
+                querier.set_budget(1 << 13);
+                let answer = querier.motion(&block, &block, &slide, &MotionOptions::new());
+                match answer.unwrap_or_else(|error| panic!("{way} {share}: {error}")) {
+                    MotionAnswer::Free => found[0] += 1,
+                    MotionAnswer::Near { .. } => found[1] += 1,
+                    hit @ MotionAnswer::Hit { .. } => panic!("{hit:?}"),
+                }
+                querier.set_budget(u64::MAX);
+                let coarse = querier.motion(&block, &block, &slide, &MotionOptions::new().tolerance(0.02));
+                assert_eq!(coarse.unwrap(), plain(querier, (&block, &block), &slide, (0.0, 0.02)), "{way}");
+            }
+        }
+    }
+    assert!(found.iter().all(|&count| count > 10), "{found:?}");
+}
+
 #[test]
 fn numbers_that_mean_nothing_are_refused() {
     let (mut querier, block) = (Querier::new().unwrap(), baked(&cube()));

@@ -14,7 +14,8 @@
 //! inside only through the surface, so only the start of the path and cells after an undecided one need this test.
 //!
 //! The search skips cells that are certainly clear, many at a time: those of an interval during which everything stays
-//! farther apart than the clearance and an eighth of the tolerance, which is as far as any cell reaches ([`sweep`]). After
+//! farther apart than the clearance and an eighth of the tolerance, which is as far as any cell reaches ([`sweep`]), or as far as these do
+//! where B slides. After
 //! the first undecided cell it skips those that are certainly no hits, because everything stays farther apart than the
 //! clearance. If a sweep leaves few pairs of
 //! triangles, they are kept for the parts of the interval. All other pairs are apart during the whole interval, so
@@ -139,9 +140,9 @@ impl Querier {
     ///
     /// Cost: about one contact query for each interval that must be tested. There are few intervals if B keeps a
     /// distance that is larger than the bend of its path, and some thirty for a hit, or for a gap below the tolerance. There may
-    /// be one query for each eighth of the tolerance that B moves by while the gap is no more than rounding, or while B turns
-    /// at a gap far below the tolerance, because a hit may still follow: seconds where a part slides over the floor it rests
-    /// on. A larger tolerance or a budget limits that, and [`Querier::is_free`] avoids it, because it can say no at once.
+    /// be one query for each eighth of the tolerance that B moves by while it turns at a gap far below the tolerance, or moves
+    /// straight at a slant to A's axes at a gap of some roundings, because a hit may still follow. A larger tolerance or a
+    /// budget limits that, and [`Querier::is_free`] avoids it, because it can say no at once.
     ///
     /// # Errors
     /// [`QueryError::Number`] if the clearance or the tolerance is not a valid number, or if the tolerance is too small

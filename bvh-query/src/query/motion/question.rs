@@ -7,6 +7,7 @@ use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::MotionOptions;
+use crate::query::motion::search::MAX_DEPTH;
 use crate::query::rounded::limit_of_cores;
 use bvh_format::object::Object;
 
@@ -22,6 +23,9 @@ const LEAST_TOLERANCE: f64 = 1.0 / (1u64 << 38) as f64;
 /// That is 12 u of both radii and 9 u of a translation; the sum has both radii thrice, and two translations. A relative error of
 /// 6 u is that of the limit itself.
 const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
+
+/// More than the relative error of dividing a way into cells.
+const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// Two shapes, the path of B in A's frame, and what counts as a hit.
 pub(super) struct Question<'a> {
@@ -109,6 +113,31 @@ impl<'a> Question<'a> {
         let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
         let least = self.clearance + reach + self.sagitta(t0, t1);
         least * (1.0 + ROUNDING) + ROUNDING * magnitude
+    }
+
+    /// Returns how far any cell of an interval reaches at most. Cells have a reach of at most an eighth of the tolerance, and may have
+    /// little more than half of that.
+    ///
+    /// If B slides, it moves steadily but for the sagitta s: in cells of one length, by d with at most 2 s to spare. So if such cells certainly
+    /// reach no more than the eighth, and those of twice the length certainly more, then all cells have that length.
+    pub(super) fn reach_of_cells(&self, stretch: &Stretch) -> f64 {
+        let ([t0, t1], [start, end]) = (stretch.times, &stretch.poses);
+        let most = self.tolerance / 8.0;
+        if !self.path.slides(t0, t1) {
+            return most;
+        }
+        let way = displacement(self.b, start, end);
+        // What is charged for the roundings of poses does not shrink with cells.
+        let charged = displacement(self.b, start, start) + displacement(self.b, end, end);
+        let spare = charged + 3.0 * self.sagitta(t0, t1);
+        let half = |depth: i32| way / (t1 - t0) * 2f64.powi(-depth - 1);
+        let reaches = |depth: &i32| half(*depth) * (1.0 + SLACK) + spare <= most;
+        match (0..=MAX_DEPTH as i32).find(reaches) {
+            Some(depth) if (half(depth - 1) - charged) * (1.0 - SLACK) - spare > most => {
+                half(depth) * (1.0 + SLACK) + spare
+            }
+            _ => most,
+        }
     }
 
     /// The same limit for boxes along A's axes. If B slides, rounding moves each corner to where it is in some pose, or not as far,

@@ -41,7 +41,7 @@ const LEAST_GUESSED: f64 = 16.0;
 /// The most intervals that may wait while a search for any hit takes long intervals first.
 const MOST_SPREAD: usize = 64;
 /// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
-const MAX_DEPTH: u32 = 45;
+pub(super) const MAX_DEPTH: u32 = 45;
 /// Bounds how close to a guessed contact several intervals are swept together. From the end of such a group to the
 /// contact, B must still move by at least this many times the gap that a sweep of the group needs. The value only
 /// divides the work; it affects no answer.
@@ -287,12 +287,12 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     /// Returns how far apart parts must be at both ends of an interval to be left out. Before the first undecided cell, all cells
     /// of what is left out are clear. After it, only hits matter, and none of these cells is one.
     fn limit(&self, stretch: &Stretch) -> f64 {
-        self.question.limit(stretch, self.reach())
+        self.question.limit(stretch, self.reach(stretch))
     }
 
     /// How far B may be from its pose in the middle of a cell, if cells that are not clear matter.
-    fn reach(&self) -> f64 {
-        if self.undecided.is_none() { self.question.tolerance / 8.0 } else { 0.0 }
+    fn reach(&self, stretch: &Stretch) -> f64 {
+        if self.undecided.is_none() { self.question.reach_of_cells(stretch) } else { 0.0 }
     }
 
     /// Returns whether a pose is a hit.
@@ -411,8 +411,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
         let question = self.question;
         let [start, end] = interval.stretch.poses;
-        let (limit, box_limit) =
-            (self.limit(&interval.stretch), question.box_limit(&interval.stretch, self.reach()));
+        let reach = self.reach(&interval.stretch);
+        let [limit, box_limit] =
+            [question.limit(&interval.stretch, reach), question.box_limit(&interval.stretch, reach)];
         let sweep = Sweep { start, middle: *middle, end, limit, box_limit };
         let pairs = match &interval.pairs {
             Some(pairs) => pairs.clone(),
