@@ -11,12 +11,9 @@
 
 use crate::error::ShapeError;
 use crate::input::mesh::Mesh;
+use crate::triangles::placement::on_unit;
 use bvh_format::object::MAX_COORDINATE;
 use robust::{Coord, Coord3D};
-
-/// Smaller coordinates count as 0. Every number that a file holds is larger, and products of three differences of the others
-/// do not underflow.
-const MIN_COORDINATE: f64 = 1.0 / (1u128 << 100) as f64 / (1u128 << 100) as f64;
 
 /// A triangle of the hull.
 struct Face {
@@ -61,9 +58,8 @@ impl Face {
 }
 
 /// Makes the convex hull of points: closed, looking outwards, and solid with `bvh_query::Shape::solid`. Its vertices are some
-/// of the points, of which those in a face may be some, too. If all coordinates are f32 numbers, each point is inside the hull or
-/// on it, exactly. Otherwise this holds until the vertices are rounded, and a point is then outside by at most what the report of
-/// the bake states as the largest rounding.
+/// of the points, of which those in a face may be some, too. Each point is inside the hull or on it, exactly, once its coordinates
+/// are multiples of 2^-180, as those of files are.
 ///
 /// A million points take a third of a second, or five seconds if all of them are vertices (AMD EPYC, Zen 5 class, 2026-11-25).
 /// At worst the time grows with the square of their number.
@@ -76,8 +72,8 @@ pub fn convex_hull(points: &[[f64; 3]]) -> Result<Mesh, ShapeError> {
     {
         return Err(ShapeError::Point { number, found: points[number] });
     }
-    let flushed = |x: f64| if x.abs() < MIN_COORDINATE { 0.0 } else { x };
-    let points: Vec<[f64; 3]> = points.iter().map(|p| p.map(flushed)).collect();
+    // Products of three differences of these do not underflow.
+    let points: Vec<[f64; 3]> = points.iter().map(|p| p.map(on_unit)).collect();
     let [a, b, c, d] = simplex(&points)?;
     // Both sides of a triangle, and then what the fourth point makes of it.
     let mut faces = vec![Face::new([a, b, c], [1; 3]), Face::new([a, c, b], [0; 3])];

@@ -14,7 +14,7 @@
 //! | voxels, octree | [`voxels`], [`octree`] | 0 | yes |
 //!
 //! Each function places its shape at the origin of the mesh's frame, with lengths in mesh units, and looks outwards: the
-//! corners of a triangle turn counter-clockwise as seen from outside. Vertices are rounded to f32 when they are baked.
+//! corners of a triangle turn counter-clockwise as seen from outside. Bakes keep these numbers as they are.
 
 mod cells;
 mod hull;
@@ -28,9 +28,9 @@ use std::f64::consts::{PI, TAU};
 
 /// The most sides of the polygon around a circle.
 const MAX_SIDES: f64 = 4096.0;
-/// A polygon is larger than one that touches its circle by this factor, so that the rounding of its vertices to f32 does not
-/// bring a side inside.
-const ROUNDING: f64 = 1.0 + 1.0 / (1u32 << 21) as f64;
+/// A polygon is larger than one that touches its circle by this factor, 32 roundings, so that those of its corners do not bring a
+/// side inside.
+const ROUNDING: f64 = 1.0 + 1.0 / (1u64 << 48) as f64;
 
 /// Makes a point: the core of a ball.
 pub fn point(at: [f64; 3]) -> Mesh {
@@ -91,7 +91,7 @@ fn between(lo: [f64; 3], hi: [f64; 3]) -> Mesh {
 pub struct Circumscribed {
     /// The polyhedron, which contains the shape.
     pub mesh: Mesh,
-    /// How far its points are at most from the shape, in mesh units: at most the error that was asked for, and what f32 adds.
+    /// How far its points are at most from the shape, in mesh units: at most the error that was asked for, but for roundings.
     pub error: f64,
 }
 
@@ -103,9 +103,7 @@ pub struct Circumscribed {
 pub fn cylinder(radius: f64, length: f64, max_error: f64) -> Result<Circumscribed, ShapeError> {
     let (ring, error) = ring(radius, max_error)?;
     check("length", length)?;
-    // Wider at the ends, too: they are rounded to f32.
-    let (sides, half) = (ring.len() as u32, length / 2.0 * ROUNDING);
-    let error = error.max(half * ROUNDING - length / 2.0);
+    let (sides, half) = (ring.len() as u32, length / 2.0);
     let at = |z: f64| ring.iter().map(move |&[x, y]| [x, y, z]);
     let mut triangles = Vec::new();
     for side in 0..sides {
@@ -225,11 +223,10 @@ mod tests {
             assert!(
                 found > exact && found < exact * (1.0 + prism.error / radius).powi(2) * (1.0 + prism.error)
             );
-            assert!(prism.error <= max_error * 1.001 + 2e-6 * (1.5 + radius), "{} {max_error}", prism.error);
-            // All sides are outside the circle, also after they are rounded to f32.
-            let ring: Vec<[f64; 3]> =
-                prism.mesh.objects[0].positions.iter().map(|p| p.map(|x| f64::from(x as f32))).collect();
-            assert!(ring.iter().all(|p| p[2].abs() >= 1.5 && p[2].abs() <= 1.5 + prism.error));
+            assert!(prism.error <= max_error + 2e-14 * radius, "{} {max_error}", prism.error);
+            // All sides are outside the circle.
+            let ring = &prism.mesh.objects[0].positions;
+            assert!(ring.iter().all(|p| p[2].abs() == 1.5));
             let sides = ring.len() / 2;
             for side in 0..sides {
                 let ([px, py, _], [qx, qy, _]) = (ring[side], ring[(side + 1) % sides]);

@@ -353,8 +353,7 @@ cbvh_status cbvh_bake_warning(size_t number, char *buffer, size_t capacity, size
  *
  * Lengths are in mesh units. CBVH_INVALID_ARGUMENT for a length that is not finite and above 0. Points and sides are 3
  * numbers each, unless stated otherwise. CBVH_BAKE_FAILED if a coordinate is not finite or beyond 2^120, or if there
- * are no points or cells. Vertices are rounded as those of cbvh_bake are, to floats around one origin in double.
- * Surfaces look outwards. */
+ * are no points or cells. Surfaces look outwards. */
 
 /* Bakes points, as triangles without area. Triangle `i` of answers is point `i`. Equal points stay: in contacts, each
  * is a triangle of its own. */
@@ -367,9 +366,9 @@ cbvh_status cbvh_bake_box(const double *sides, cbvh_mesh *mesh);
  * There is nothing beyond its sides. */
 cbvh_status cbvh_bake_ground(const double *sides, double thickness, cbvh_mesh *mesh);
 /* Bakes a prism around a cylinder, whose axis is z and whose middle is at the origin. No point of the prism is farther
- * from the cylinder than `error`, which is at most `max_error` and what the rounding of vertices adds; `error` may be
- * NULL. CBVH_INVALID_ARGUMENT if the prism would need more than 4,096 sides: if `max_error` is less than about 3e-7 of
- * the radius. */
+ * from the cylinder than `error`, which is at most `max_error` but for roundings; `error` may be NULL.
+ * CBVH_INVALID_ARGUMENT if the prism would need more than 4,096 sides: if `max_error` is less than about 3e-7 of the
+ * radius. */
 cbvh_status cbvh_bake_cylinder(double radius, double length, double max_error, double *error, cbvh_mesh *mesh);
 /* Bakes a pyramid around a cone, whose base is centred at the origin in the plane z = 0 and whose apex is at z =
  * `height`. The errors are those of cbvh_bake_cylinder. */
@@ -389,9 +388,8 @@ cbvh_status cbvh_bake_voxels(const int32_t *cells, size_t count, double side, cb
  * another one, counts once. CBVH_INVALID_ARGUMENT for a size that is not a power of two, or a corner that is not at
  * multiples of it. */
 cbvh_status cbvh_bake_octree(const int32_t *cells, const uint32_t *sizes, size_t count, double side, cbvh_mesh *mesh);
-/* Bakes the convex hull of points, decided exactly. Its vertices are some of the points. Each point is inside it or on it
- * if all coordinates are floats, and otherwise at most as far outside as vertices are rounded. CBVH_INVALID_ARGUMENT if all
- * points are in one plane, as fewer than 4 always are, and for a coordinate that is not finite or beyond 2^120. */
+/* Bakes the convex hull of points, decided exactly. Its vertices are some of the points. Each point is inside it or on
+ * it. CBVH_INVALID_ARGUMENT if all points are in one plane, as fewer than 4 always are, and for a coordinate that is not finite or beyond 2^120. */
 cbvh_status cbvh_bake_convex_hull(const double *points, size_t count, cbvh_mesh *mesh);
 
 /* -------------------------------------------------------------------------------------------------------- queriers */

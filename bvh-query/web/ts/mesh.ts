@@ -210,8 +210,8 @@ export class Mesh extends Handle<raw.Mesh> {
     /**
      * Bakes a mesh.
      *
-     * Vertices are stored as float32 offsets from an origin of each object. A vertex whose coordinates are float32 numbers
-     * does not move. Others move by at most 2^-23 of the diagonal of the object's box. Answers are exact for the stored mesh.
+     * Answers are exact for the numbers that are given, which are stored as they are. Vertices move only if that is asked for, with
+     * `round`, `weld` or triangles "quantized"; `maxMove` states by how much.
      *
      * @param vertices 3 V numbers, in any unit of length.
      * @param faces 3 F vertex numbers; by default, every three vertices are a triangle.

@@ -99,9 +99,9 @@ def bake(
     about a microsecond per triangle. `Mesh.save` writes the result. ``round="f32"`` rounds each coordinate to the nearest float32
     number, ties to even, as games store them: coordinates that are equal in two meshes then stay equal.
 
-    Vertices are stored as float32 offsets from an origin of each object. A vertex whose coordinates are float32 numbers
-    does not move. Others move by at most 2^-23 of the diagonal of the object's box, or by up to ``max_error`` with
-    ``triangles="quantized"``. Answers are exact for the stored mesh.
+    Answers are exact for the numbers that are given, which are stored as they are, float64 numbers too. Vertices move only if that
+    is asked for: with ``round``, ``weld`` or ``triangles="quantized"``, by up to ``max_error``. Then answers are exact for the mesh as
+    stored, and `Mesh.max_move` states by how much it differs.
     """
     points = _cbvh.copied_numbers(vertices, "vertices")
     try:

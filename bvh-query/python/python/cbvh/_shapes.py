@@ -79,8 +79,7 @@ def cloud(points: ArrayLike, radius: float = 0.0) -> Mesh:
 
 def convex_hull(points: ArrayLike) -> Mesh:
     """The solid convex hull of points of shape (N, 3), decided exactly. Its vertices are some of the points. Every point is
-    inside it or on it if the coordinates are float32 numbers, and otherwise at most as far outside as the bake rounds
-    vertices. Raises ValueError if all points are in one plane or if a coordinate is not finite."""
+    inside it or on it. Raises ValueError if all points are in one plane or if a coordinate is not finite."""
     return Mesh(_cbvh.convex_hull_core(points)).solid()
 
 
