@@ -87,7 +87,8 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
                 format!("free until {free_until:?}, {apart:?} mesh units apart at {at:?}, undecided\n")
             }
         };
-        text.push_str(&mesh::describe(session.meshes(), distance));
+        let moves = session.meshes().map(|mesh| mesh.shape().max_move());
+        text.push_str(&mesh::describe(session.meshes(), distance, moves));
         if let Some(path) = &arguments.witness {
             write_file(path, &mesh::obj(session.meshes(), &motion.pose(at), distance)?)?;
         }

@@ -41,7 +41,7 @@ that are apart, and nan if a mesh is not closed.
 and collide, within (true or false), relation, contacts and pairs (the triangles), lower, upper, translation, point and radii (what \
 proves lower: a ball about the point in each mesh), or distance, lower, upper, point_a, \
 point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies between lower and upper, and points are in the \
-frame of A.
+frame of A. If a file has moved vertices, given_lower and given_upper are bounds for the meshes that were given.
 
 --bench prints one object per file: what was asked, the times of the queries, positives (all answers of relation but 1 and 5) \
 and answers_xxh3, a hash of the answers, which is the same for every --isa and --jobs. It is null if --budget cut the run \
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &QueryArguments) -> Result<(), Failure> {
     let pose = arguments.pose.as_deref().map_or(Ok(Pose::IDENTITY), files::one_pose)?;
     let session = session()?;
     let answer = session.ask(|querier| question.ask(querier, session.shapes(), &pose))?;
-    if let (Some(path), Answer::Distance(distance)) = (&arguments.witness, &answer) {
+    if let (Some(path), Answer::Distance(distance, _)) = (&arguments.witness, &answer) {
         write_file(path, &mesh::obj(session.meshes(), &pose, distance)?)?;
     }
     session.tell_one(&answer, &question.describe(session.meshes(), &answer))
@@ -128,7 +128,7 @@ struct Question {
     /// The distance of `Mode::Within`, in mesh units.
     within: f64,
     errors: DistanceOptions,
-    /// Whether contacts are listed, not only counted.
+    /// Whether answers are told in full: contacts are listed, not only counted.
     list: bool,
 }
 
@@ -141,8 +141,8 @@ enum Answer {
     Within(bool),
     /// The number of pairs of triangles in contact, and the pairs if they are to be listed.
     Contacts(u64, Vec<Contact>),
-    /// How far apart they are.
-    Distance(Distance),
+    /// How far apart they are, and how far vertices moved before they were stored.
+    Distance(Distance, [f64; 2]),
     /// How they lie.
     Relation(Relation),
     /// How deep they overlap; none if a mesh is not closed.
@@ -185,7 +185,10 @@ impl Question {
                 let count = querier.visit_contacts(a, b, pose, |_| ControlFlow::Continue(()))?;
                 Answer::Contacts(count, Vec::new())
             }
-            Mode::Distance => Answer::Distance(querier.distance_with(a, b, pose, &self.errors)?),
+            Mode::Distance => {
+                let moves = if self.list { [a, b].map(|shape| shape.max_move()) } else { [0.0; 2] };
+                Answer::Distance(querier.distance_with(a, b, pose, &self.errors)?, moves)
+            }
             Mode::Within => Answer::Within(querier.within(a, b, pose, self.within)?),
             Mode::Relation => Answer::Relation(querier.relation(a, b, pose)?),
             Mode::Penetration => match querier.penetration(a, b, pose, &PenetrationOptions::default()) {
@@ -217,7 +220,7 @@ impl Question {
                 }
                 text
             }
-            Answer::Distance(distance) => mesh::describe([mesh_a, mesh_b], distance),
+            Answer::Distance(distance, moves) => mesh::describe([mesh_a, mesh_b], distance, *moves),
             Answer::Relation(Relation::Undefined) => format!("{}{}\n", in_words(Relation::Undefined), why()),
             Answer::Relation(relation) => format!("{}\n", in_words(*relation)),
             Answer::Penetration(None) => format!("undefined, because a mesh is not closed{}\n", why()),
@@ -236,7 +239,7 @@ impl asking::Answer for Answer {
     /// Returns true for contact, for a yes to `within`, and if any part of a mesh is inside the other.
     fn is_positive(&self) -> bool {
         match self {
-            Self::Distance(of) => of.distance <= 0.0,
+            Self::Distance(of, _) => of.distance <= 0.0,
             Self::Relation(relation) => !matches!(relation, Relation::Apart | Relation::Undefined),
             _ => self.value() > 0.0,
         }
@@ -246,7 +249,7 @@ impl asking::Answer for Answer {
         match self {
             Self::Collide(flag) | Self::Within(flag) => f64::from(u8::from(*flag)),
             Self::Contacts(count, _) => *count as f64,
-            Self::Distance(of) => of.distance,
+            Self::Distance(of, _) => of.distance,
             Self::Relation(relation) => f64::from(*relation as u8),
             Self::Penetration(depth) => depth.map_or(0.0, |of| of.lower),
         }
@@ -275,7 +278,11 @@ impl asking::Answer for Answer {
                 });
                 record! { contacts: count, pairs: pairs.collect::<Vec<_>>() }
             }
-            Self::Distance(distance) => asking::distance_json(distance),
+            Self::Distance(distance, moves) => {
+                let given = mesh::as_given(*moves, distance);
+                let given = given.map(|[lower, upper]| record! { given_lower: lower, given_upper: upper });
+                asking::distance_json(distance).with(given)
+            }
             Self::Relation(relation) => record! { relation: *relation as u8 },
             Self::Penetration(None) => record! { penetration: None::<f64> },
             Self::Penetration(Some(of)) => record! {
@@ -289,7 +296,7 @@ impl asking::Answer for Answer {
         match self {
             Self::Collide(flag) | Self::Within(flag) => hasher.update(&[u8::from(*flag)]),
             Self::Contacts(count, _) => hasher.update(&count.to_le_bytes()),
-            Self::Distance(of) => hasher.update(&of.distance.to_bits().to_le_bytes()),
+            Self::Distance(of, _) => hasher.update(&of.distance.to_bits().to_le_bytes()),
             Self::Relation(relation) => hasher.update(&[*relation as u8]),
             Self::Penetration(depth) => {
                 let numbers = depth.map_or([f64::NAN; 5], |of| {

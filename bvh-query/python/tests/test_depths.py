@@ -269,7 +269,7 @@ class Depths(unittest.TestCase):
             cracked.solid()
         closed = cbvh.bake(apart, own, weld=weld)
         self.assertEqual(closed.open_edges()[:4], (0, 0, 0, []))
-        self.assertEqual(closed.side([[0.0, 0.0, 0.0]]).tolist(), [cbvh.Side.INSIDE])
+        self.assertIs(closed.sides([0.0, 0.0, 0.0]), cbvh.Side.INSIDE)
         with self.assertRaisesRegex(ValueError, "topology"):
             cbvh.bake(vertices, faces, topology=False).open_edges()
 

@@ -178,7 +178,8 @@ export const cases = {
         near(open.edges[0].gap, 1e-6, 1e-9, "the gap");
         ok(open.text.includes("bake with --weld 1e-5"), open.text);
         equal(cbvh.Mesh.bake(corners, faces, { weld: 1e-5 }).openEdges().boundary, 0);
-        equal(cbvh.Mesh.bake(corners, faces.slice(3)).openEdges().proposedWeld, undefined);
+        const hole = cbvh.Mesh.bake(corners, faces.slice(0, 9)).openEdges();
+        equal([hole.boundary, hole.cracks, hole.proposedWeld], [3, 0, undefined]);
 
         equal(cube.selfContacts().triangles, []);
         const [first, crossing] = [
@@ -475,7 +476,7 @@ export const cases = {
     },
 
     "files of four formats are the same mesh": async (cbvh, read) => {
-        const robot = cbvh.Mesh.bakeFile("fclrob.obj", await read("testdata/fclrob.obj"));
+        const robot = cbvh.Mesh.bakeFile("fclrob.obj", await read("testdata/fclrob.obj"), { round: "f32" });
         const triangles = robot.triangles();
         equal([robot.triangleCount, triangles.length, robot.names], [216, 9 * 216, [""]]);
         const stages = [];
@@ -574,7 +575,8 @@ export const cases = {
         for (const name of await list("testdata", "ok-")) {
             const mesh = cbvh.Mesh.open(await read(`testdata/${name}`));
             mesh.validate();
-            if (name !== "ok-profiles.cbvh") {
+            // Without ids, triangles of several objects have no order.
+            if (!/^ok-(profiles|exact)/.test(name)) {
                 ok(mesh.triangles().length > 0, "triangles");
             }
             mesh.distance(mesh, at(9, 0, 0));

@@ -224,13 +224,13 @@ pub(crate) fn bake_in_memory(
     Ok((Bvh::from_bytes(bytes).map_err(|error| failed(BakeError::Unproved(error)))?, report))
 }
 
-/// Returns a distance, its bounds and the closest points with their triangles.
-pub(crate) fn describe([mesh_a, mesh_b]: [&LoadedMesh; 2], answer: &Distance) -> String {
+/// Returns a distance, its bounds and the closest points with their triangles, for meshes of which vertices moved by at most `moves`.
+pub(crate) fn describe([mesh_a, mesh_b]: [&LoadedMesh; 2], answer: &Distance, moves: [f64; 2]) -> String {
     let Distance { distance, lower, upper, point_a, point_b, .. } = answer;
     let a = name(mesh_a, answer.object_a, answer.triangle_a);
     let b = name(mesh_b, answer.object_b, answer.triangle_b);
     let touch = if *distance == 0.0 { " (the meshes touch)" } else { "" };
-    let given = as_given([mesh_a, mesh_b].map(|mesh| mesh.shape().max_move()), answer);
+    let given = as_given(moves, answer);
     let given =
         given.map_or(String::new(), |[lower, upper]| format!(", and {lower:?} to {upper:?} as given"));
     format!(
@@ -242,7 +242,7 @@ pub(crate) fn describe([mesh_a, mesh_b]: [&LoadedMesh; 2], answer: &Distance) ->
 
 /// Returns bounds of the distance of the meshes that were given, of which vertices moved by at most `moves` before they were
 /// stored; none if no vertex moved.
-fn as_given(moves: [f64; 2], answer: &Distance) -> Option<[f64; 2]> {
+pub(crate) fn as_given(moves: [f64; 2], answer: &Distance) -> Option<[f64; 2]> {
     // A pose may stretch how far B's vertices moved by 2^-19. Sums are rounded outward.
     let [a, b] = moves;
     let most = (a + b * (1.0 + 1.0 / (1 << 18) as f64)).next_up();

@@ -55,6 +55,17 @@ fn all_commands_that_read_meshes_take_equal_numbers_for_equal() {
     let found = [clashes("").done(), clashes(" --round f32").done_as_stored(2)];
     let [plain, rounded]: [Vec<Value>; 2] = found.map(|found| classes(found.json()));
     assert_eq!((plain.len(), rounded), (0, vec![Value::from("touching")]));
+    let distance =
+        |more| directory.cbvh(&format!("query a.obj b.obj poses.txt --mode distance --json{more}"));
+    let [plain, rounded] =
+        [distance("").done(), distance(" --round f32").done_as_stored(2)].map(|of| of.json());
+    let bound = |of: &Value, name: &str| of[name].as_f64();
+    let given = plain["distance"].as_f64().unwrap();
+    assert!(rounded["distance"] == 0.0 && bound(&plain, "given_lower").is_none(), "{plain} {rounded}");
+    assert!(
+        bound(&rounded, "given_lower") == Some(0.0) && bound(&rounded, "given_upper") > Some(given),
+        "{rounded}"
+    );
     for wrong in ["query a.obj b.obj poses.txt", "clash a.obj b.obj", "bake a.obj -o a.cbvh"] {
         directory.cbvh(&format!("{wrong} --round f16")).failed(1, &["--round", "expected none or f32"]);
     }
