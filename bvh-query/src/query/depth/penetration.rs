@@ -246,6 +246,12 @@ impl<'a> DepthSearch<'a> {
         let line = self.line;
         self.improve(querier.point_at_contact(&line.along([1.0, 0.0, 0.0]))?);
         self.improve(querier.balls(&line, FIRST_POINTS, f64::INFINITY)?);
+        // Boxes are wider than vertices where offsets leave something out.
+        let has_wide_box =
+            |shape: Shape<'_>| shape.objects().iter().any(|of| of.vertices().left_out != [0.0; 3]);
+        if self.best > 0.0 && self.is_done() && (has_wide_box(line.a) || has_wide_box(line.b)) {
+            self.attempt(querier, unit(self.translation)?)?;
+        }
         for start in self.first_directions() {
             if !self.is_done() {
                 self.descend(querier, start)?;
