@@ -5,12 +5,12 @@
 //! directions cannot be joined on the way up, so a turning slab is compared with all triangles below it. These are kept
 //! for subtrees that are small enough to have one.
 
-use crate::decode::decode_page;
 use crate::error::{FormatError, ensure};
 use crate::kdop::Kdop;
 use crate::layout::Layout;
 use crate::leaf::{PACKET, Packet, decode_packet};
 use crate::object::Object;
+use crate::page::decode::decode_page;
 use crate::page::{Page, RootRef};
 use crate::rule::Rule;
 use crate::treelet::Child;

@@ -5,6 +5,7 @@
 use crate::error::{FormatError, ensure};
 use crate::object::MAX_RADIUS;
 use crate::rule::Rule;
+use crate::vec3::{cross, dot};
 use std::collections::HashSet;
 use zerocopy::byteorder::little_endian::{F64, U32};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
@@ -113,11 +114,7 @@ pub fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
 
 /// Returns the determinant of three rows, which is negative for a reflection.
 pub fn handedness(&[x, y, z]: &[[f64; 3]; 3]) -> f64 {
-    dot([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]], z)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    dot(cross(x, y), z)
 }
 
 /// Writes the instances section.

@@ -20,7 +20,7 @@
 //!    [`page::Page`] reads it without any further check.
 //! 3. A [treelet] in a page holds the bounds of up to eight children, and [`treelet::Links`] says where each
 //!    child is: in the same page, in a later page, or a packet of triangles.
-//! 4. [`decode::decode_child`] turns the bounds of a child into [slabs], given the slabs of its parent.
+//! 4. [`page::decode::decode_child`] turns the bounds of a child into [slabs], given the slabs of its parent.
 //! 5. The [leaf] block of a page holds its triangles, and the [ids] block their numbers in the input.
 //! 6. A file may also state where its objects stand ([instances]), and which of them are closed ([topology]).
 //!
@@ -59,7 +59,6 @@ compile_error!(
 mod bits;
 pub mod bounds;
 pub mod checksum;
-pub mod decode;
 mod error;
 pub mod header;
 pub mod ids;
@@ -82,6 +81,7 @@ pub mod topology;
 pub mod treelet;
 pub mod turning;
 pub mod validate;
+pub mod vec3;
 pub mod vertex;
 
 pub use error::FormatError;

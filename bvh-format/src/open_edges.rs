@@ -16,6 +16,9 @@ mod text;
 pub use count::{Classifier, OpenSet, Sums, Traversal, count, edges_of_page, uncancelled};
 pub use gaps::{MAX_MEASURED, MAX_NODES_PER_EDGE};
 
+/// The bits of both ends of an edge, in mesh units and without negative zeros, the lesser end first.
+type Ends = [u64; 6];
+
 /// The number of open edges that are listed of each kind.
 pub const MAX_LISTED: usize = 8;
 /// The number of triangles that are listed of each open edge.

@@ -11,6 +11,7 @@
 //! the same order. [`check_page`] requires this order, which ensures that no slot, packet or link can be reached twice.
 
 mod check;
+pub mod decode;
 mod patcher;
 mod reader;
 mod writer;

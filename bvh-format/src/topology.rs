@@ -4,10 +4,6 @@
 //! A head, one record per object, the components of all objects and the nets of all objects follow each other. Section
 //! 3.2 of `spec/format.md` states each byte and defines the terms.
 
-mod in_pages;
-
-pub use in_pages::check_in_pages;
-
 use crate::checksum::checksum;
 use crate::error::{FormatError, ensure};
 use crate::object::Object;
@@ -54,8 +50,8 @@ const _: () = assert!(size_of::<TopologyRecord>() == 16 && size_of::<Net>() == 8
 pub struct ObjectTopology {
     /// Whether the triangles have no boundary, each counted as often as its net says.
     pub closed: bool,
-    components: Range<usize>,
-    nets: Range<usize>,
+    pub(crate) components: Range<usize>,
+    pub(crate) nets: Range<usize>,
 }
 
 impl ObjectTopology {
@@ -237,7 +233,7 @@ fn ascend(at: u64, place: u32, next: &mut u64, end: u64) -> Result<(), FormatErr
 }
 
 /// Visits the entries of a list, each with its byte offset in the file.
-fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable, E: From<S::Error>>(
+pub(crate) fn visit_list<S: Source + ?Sized, T: FromBytes + KnownLayout + Immutable, E: From<S::Error>>(
     source: &S,
     range: &Range<usize>,
     mut visit: impl FnMut(u64, &T) -> Result<(), E>,

@@ -348,7 +348,7 @@ mod tests {
             let parent = NodeSlabs::from_kdop(&parent, 13);
             let mut treelet = vec![0; profile.treelet_bytes()];
             SlabEncoder::new(profile, 1.0, &parent).encode(1, &kdop, &mut treelet);
-            let node = crate::decode::decode_child(profile, 1.0, &treelet, 1, &parent);
+            let node = crate::page::decode::decode_child(profile, 1.0, &treelet, 1, &parent);
             assert_eq!(decode_turning(profile, &treelet, 1, &node), None);
             encode_turning(profile, &mut treelet, 1, &node, &tight);
             let Some(decoded) = decode_turning(profile, &treelet, 1, &node) else {

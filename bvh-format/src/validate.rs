@@ -5,11 +5,12 @@
 //! sums over the pages, so memory does not grow with the file.
 
 mod counts;
+mod topology_in_pages;
 
 pub use counts::Counts;
+pub use topology_in_pages::check_in_pages;
 
 use crate::checksum::{Hasher, hex};
-use crate::decode::decode_page;
 use crate::error::{FormatError, ensure, require};
 use crate::header::SectionKind;
 use crate::ids::decode_id;
@@ -17,10 +18,11 @@ use crate::instances::Instance;
 use crate::layout::{ContentHasher, Layout, PairsInOrder};
 use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, VertexBlock, decode_packet};
 use crate::object::{MAX_COORDINATE, Object};
+use crate::page::decode::decode_page;
 use crate::page::{Page, check_crossing, check_page};
 use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source, chunks};
-use crate::topology::{ObjectTopology, boundary_of, check_in_pages};
+use crate::topology::{ObjectTopology, boundary_of};
 use crate::treelet::Child;
 use crate::vertex::{NO_FINER, Vertices, is_multiple_of_least};
 use std::ops::Range;

@@ -1,6 +1,7 @@
 //! The transforms of the nodes of a scene, and their division into a rigid pose and the rest, which is baked into the
 //! mesh.
 
+pub(super) use bvh_format::vec3::{cross, dot};
 use std::collections::BTreeSet;
 
 /// The first three rows of a 4x4 matrix.
@@ -153,20 +154,12 @@ fn divided(columns: [[f64; 3]; 3], known: &mut Scales) -> (Linear, Linear) {
     (transposed(&[x, y, cross(x, y)]), diagonal(scales))
 }
 
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 fn is_one_factor(shape: &Linear) -> bool {
     *shape == diagonal([shape[0][0]; 3])
 }
 
 fn diagonal([x, y, z]: [f64; 3]) -> Linear {
     [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn minus(a: [f64; 3], b: [f64; 3], factor: f64) -> [f64; 3] {

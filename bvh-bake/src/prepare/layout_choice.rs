@@ -16,6 +16,7 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_format::realign::upper_form;
 use bvh_format::slabs::{Group, NodeSlabs};
+use bvh_format::vec3::dot;
 use std::collections::HashMap;
 
 /// A layout, and the reason for choosing it.
@@ -214,10 +215,6 @@ fn trial_overlaps([a, b]: [&Node; 2], trial: &Trial) -> [bool; 3] {
             lo <= f64::from(a.kdop.hi[slab]) && hi >= f64::from(a.kdop.lo[slab])
         })
     })
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Returns the corners of a node relative to the middle of its box, in units of its largest extent.

@@ -1,7 +1,7 @@
 //! Counts the open edges of an object.
 
 use super::gaps::Measured;
-use super::{EdgesOfKind, MAX_LISTED, MAX_LISTED_TRIANGLES, OpenEdge, OpenEdges};
+use super::{EdgesOfKind, Ends, MAX_LISTED, MAX_LISTED_TRIANGLES, OpenEdge, OpenEdges};
 use crate::ids::decode_id;
 use crate::leaf::{PACKET, VertexBlock};
 use crate::object::Object;
@@ -10,9 +10,6 @@ use crate::validate::packets;
 use std::collections::BinaryHeap;
 use std::hash::{BuildHasher as _, RandomState};
 use std::ops::Range;
-
-/// The bits of both ends of an edge, in mesh units and without negative zeros, the lesser end first.
-pub(super) type Ends = [u64; 6];
 
 /// An edge that a triangle traverses: the bits of both ends, the lesser one first; the number of the triangle; and how often it
 /// traverses the edge from the lesser end to the greater one, negative for the other direction, as an `i64`.

@@ -4,8 +4,7 @@
 //! between their first and between their second ends. A k-d tree holds each edge once, and is searched for each edge and for the
 //! same edge in the other direction. Edges with a common end are no special case, however many there are.
 
-use super::count::Ends;
-use super::{Gaps, OpenEdge};
+use super::{Ends, Gaps, OpenEdge};
 
 /// The most open edges of an object that are measured.
 pub const MAX_MEASURED: usize = 1 << 16;

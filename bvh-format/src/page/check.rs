@@ -2,9 +2,9 @@
 
 use super::{NO_PARENT, PAGE, Page, PageShape, RootRef, anchor_at, page_checksum};
 use crate::checksum::hex;
-use crate::decode::decode_page;
 use crate::error::{FormatError, ensure, require};
 use crate::object::Object;
+use crate::page::decode::decode_page;
 use crate::profile::Encoding;
 use crate::quantize::F16_MAX_CODE;
 use crate::rule::Rule;

@@ -9,10 +9,10 @@ use super::{
     anchor_at, link_at,
 };
 use crate::checksum::checksum;
-use crate::decode::decode_slabs;
 use crate::ids::{WORD, encode_ids};
 use crate::kdop::Kdop;
 use crate::leaf::{LINE, PACKET, Packet, TriangleEncoding, WidePacket, encode_block};
+use crate::page::decode::decode_slabs;
 use crate::profile::Profile;
 use crate::slabs::NodeSlabs;
 use crate::treelet::{Child, ChildKind, Links, SHORT_TREELET_BYTES, SlabEncoder};
@@ -302,10 +302,10 @@ pub(super) fn write_remote(bytes: &mut [u8; PAGE], profile: Profile, roots: u8, 
 mod tests {
     use super::super::{PagePatcher, PagePlace, check_page};
     use super::*;
-    use crate::decode::decode_child;
     use crate::ids::decode_id;
     use crate::leaf::decode_packet;
     use crate::object::{Object, ObjectRecord, Volumes};
+    use crate::page::decode::decode_child;
     use crate::rule::Rule;
     use crate::treelet::Child;
     use crate::turning::{TurningDirection, decode_turning};

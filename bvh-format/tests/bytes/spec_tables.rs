@@ -5,7 +5,6 @@
 
 use bvh_format::Rule;
 use bvh_format::checksum::checksum;
-use bvh_format::decode::decode_child;
 use bvh_format::header::{
     Header, MAGIC, MAJOR, MAX_SECTIONS, MINOR, SectionEntry, SectionKind, version_name,
 };
@@ -17,6 +16,7 @@ use bvh_format::leaf::{
     PackedHead, RECORD_HEAD_BITS, TriangleEncoding, decode_packet,
 };
 use bvh_format::object::{MAX_COORDINATE, MAX_RADIUS, ObjectRecord, write_objects};
+use bvh_format::page::decode::decode_child;
 use bvh_format::page::{NO_PARENT, PAGE, PAGE_HEADER_BYTES, PageHeader, PageShape, PageWriter, TightBound};
 use bvh_format::profile::{Encoding, Profile};
 use bvh_format::quantize::{STEP_U4, STEP_U8, residual_unit};

@@ -27,6 +27,7 @@ mod robot;
 mod schema;
 mod setting;
 mod shapes;
+mod source;
 mod srdf;
 #[cfg(test)]
 mod testing;

@@ -1,40 +1,12 @@
 //! A robot as plain data, which can be stored, sent to another process, and made a robot again without any file.
 
 use crate::error::RobotError;
-use crate::options::{Base, Geometry, RobotOptions};
+use crate::options::{Base, Geometry};
 use crate::robot::Robot;
-use crate::xml::text_of;
+use crate::source::Source;
 use bvh_query::{OwnedShape, Pose};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
-
-/// The texts that a robot was read from, and how they are read.
-#[derive(Clone, Debug)]
-pub(crate) struct Source {
-    pub(crate) path: PathBuf,
-    pub(crate) urdf: String,
-    pub(crate) srdf: Option<(PathBuf, String)>,
-    pub(crate) geometry: Geometry,
-    pub(crate) base: Base,
-    /// What the readers of meshes warned of.
-    pub(crate) mesh_warnings: Vec<String>,
-}
-
-impl Source {
-    pub(crate) fn read(path: &Path, options: &RobotOptions) -> Result<Self, RobotError> {
-        let urdf = text_of(path)?;
-        let srdf = options.srdf.as_ref().map(|srdf| Ok::<_, RobotError>((srdf.clone(), text_of(srdf)?)));
-        let (geometry, base) = (options.geometry, options.base);
-        Ok(Self {
-            path: path.to_owned(),
-            urdf,
-            srdf: srdf.transpose()?,
-            geometry,
-            base,
-            mesh_warnings: Vec::new(),
-        })
-    }
-}
 
 /// All that a robot holds: see [`Robot::to_parts`].
 #[derive(Clone, Debug)]

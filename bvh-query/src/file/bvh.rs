@@ -2,7 +2,6 @@
 
 use crate::error::{OpenError, QueryError};
 use crate::file::memory;
-use crate::file::open_edges::Counted;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::unpack::unpack;
 use crate::isa::Isa;
@@ -10,6 +9,7 @@ use bvh_format::leaf::{
     F32_PACKET_BYTES, PackedHead, Packet, TriangleEncoding, VertexBlock, decode_packet, decode_triangle,
 };
 use bvh_format::object::Object;
+use bvh_format::open_edges::OpenEdges;
 use bvh_format::page::{PAGE, Page, check_page};
 use bvh_format::source::MAX_BLOCK_BYTES;
 use bvh_format::topology::ObjectTopology;
@@ -17,9 +17,10 @@ use bvh_format::treelet::Links;
 use bvh_format::{FormatError, Layout, Rule, ids};
 use bytes::Bytes;
 use memmap2::Mmap;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock, Weak};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
 
 /// An open file, with all of its objects. Every program starts with one. Cloning it copies a pointer, and threads may
 /// share it.
@@ -51,7 +52,8 @@ struct OpenFile {
     duplicates_checked: AtomicBool,
     /// What the file states about the topology of each object, or how it breaks a rule there, once it has been needed.
     topology: OnceLock<Result<Box<[ObjectTopology]>, FormatError>>,
-    counted: Counted,
+    /// The open edges that have been counted, by the numbers of their objects.
+    counted: Mutex<BTreeMap<usize, Arc<OpenEdges>>>,
     /// A number that no other open file of this process has or had.
     identity: u64,
 }
@@ -135,7 +137,7 @@ impl Bvh {
         static OPENED: AtomicU64 = AtomicU64::new(0);
         let identity = OPENED.fetch_add(1, Ordering::Relaxed);
         let duplicates_checked = AtomicBool::new(false);
-        let (topology, counted) = (OnceLock::new(), Counted::default());
+        let (topology, counted) = (OnceLock::new(), Mutex::default());
         Ok(Self(Arc::new(OpenFile {
             bytes,
             advised,
@@ -174,7 +176,7 @@ impl Bvh {
     }
 
     /// Returns the open edges that have been counted.
-    pub(super) fn counted(&self) -> &Counted {
+    pub(super) fn counted(&self) -> &Mutex<BTreeMap<usize, Arc<OpenEdges>>> {
         &self.0.counted
     }
 

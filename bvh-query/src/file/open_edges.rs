@@ -8,17 +8,13 @@ use crate::file::bvh::Bvh;
 use crate::file::shape::Shape;
 use bvh_format::object::Object;
 use bvh_format::open_edges::{OpenEdges, Traversal, count, edges_of_page};
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 
 /// The most triangles and pages of an object whose open edges are counted for an error, which takes some tenths of a second.
 const MAX_EXPLAINED_TRIANGLES: u64 = 1 << 20;
 const MAX_EXPLAINED_PAGES: usize = 1 << 13;
 /// The most edges that are in memory meanwhile, 16 MiB.
 const MAX_EXPLAINED_EDGES: usize = 1 << 18;
-
-/// The open edges that have been counted, by the numbers of their objects.
-pub(super) type Counted = Mutex<BTreeMap<usize, Arc<OpenEdges>>>;
 
 impl Bvh {
     /// Returns the open edges of an object, which are why it is not closed; none if it is closed. How many there are of each kind,

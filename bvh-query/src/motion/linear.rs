@@ -2,9 +2,7 @@
 
 pub(super) type Matrix = [[f64; 3]; 3];
 
-pub(super) fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
+pub(super) use bvh_format::vec3::length;
 
 /// The Frobenius norm, which is no less than the operator's.
 pub(super) fn norm(matrix: &Matrix) -> f64 {

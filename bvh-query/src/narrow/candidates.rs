@@ -3,8 +3,7 @@
 //! The lanes of a register belong to the three corners of a triangle, or to the edges that begin there. A row of candidates is
 //! what one corner, edge or face of a triangle makes with the corners or edges of the other one.
 
-use super::distance::{largest_of, negated, reciprocal_exponent};
-use super::{Point, Triangle};
+use super::{Point, Triangle, largest_of, negated, reciprocal_exponent};
 use crate::isa::Isa;
 use crate::isa::corners::{Corners, Three};
 use crate::isa::scalar::Scalar;

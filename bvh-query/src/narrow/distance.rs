@@ -26,7 +26,10 @@
 //! underflows after that is too small, relative to the lengths involved, to change the result.
 
 use super::candidates::{Differences, Feet, Foot, Vectors, dot as dot_at_corners, everywhere, point};
-use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, triangles_intersect};
+use super::{
+    Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, largest_of, negated, reciprocal_exponent,
+    triangles_intersect,
+};
 use crate::isa::Isa;
 use crate::isa::corners::{Corners, Three};
 use crate::isa::scalar::Scalar;
@@ -325,18 +328,6 @@ pub(super) fn longest(edges: &Triangle) -> usize {
     largest_of(edges.map(|edge| dot(edge, edge)))
 }
 
-/// Returns the index of the largest number; of equal ones, the first.
-#[inline(always)]
-pub(super) fn largest_of([p, q, r]: [f64; 3]) -> usize {
-    if p >= q && p >= r {
-        0
-    } else if q >= r {
-        1
-    } else {
-        2
-    }
-}
-
 /// Returns a normal of `d` and `e`, where `d` is not too short to be squared. The normal is perpendicular to `d` up to
 /// one rounding, however small the angle between `d` and `e`.
 pub(super) fn perpendicular_normal(d: Point, e: Point) -> Point {
@@ -352,15 +343,4 @@ pub(super) fn perpendicular_part(d: Point, e: Point) -> Point {
 #[inline(always)]
 pub(super) fn times(factor: f64, p: Point) -> Point {
     [factor * p[0], factor * p[1], factor * p[2]]
-}
-
-#[inline(always)]
-pub(super) fn negated(p: Point) -> Point {
-    [-p[0], -p[1], -p[2]]
-}
-
-/// Returns the power of two that scales a positive number into [1, 2); exact for normal numbers below 2^1023.
-pub(super) fn reciprocal_exponent(x: f64) -> f64 {
-    let exponent = x.to_bits() >> 52 & 0x7ff;
-    f64::from_bits(2046_u64.saturating_sub(exponent) << 52)
 }

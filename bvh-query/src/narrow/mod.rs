@@ -41,6 +41,8 @@ pub(crate) use stretch::{Way, leaves_before, stretch};
 pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::{triangles_below, triangles_within};
 
+pub(crate) use bvh_format::vec3::{cross, dot, subtract};
+
 #[cfg(test)]
 mod tests;
 
@@ -53,23 +55,31 @@ pub(crate) type Triangle = [Point; 3];
 /// Half a unit in the last place of 1: the largest relative error of one rounding to nearest.
 pub(crate) const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
-#[inline(always)]
-pub(crate) fn subtract(p: Point, q: Point) -> Point {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
-}
-
-#[inline(always)]
-pub(crate) fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-}
-
-#[inline(always)]
-pub(crate) fn cross(p: Point, q: Point) -> Point {
-    [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
-}
-
 /// Returns `p + factor * q`; each coordinate is rounded twice.
 #[inline(always)]
 fn add_scaled(p: Point, factor: f64, q: Point) -> Point {
     [p[0] + factor * q[0], p[1] + factor * q[1], p[2] + factor * q[2]]
+}
+
+#[inline(always)]
+fn negated(p: Point) -> Point {
+    [-p[0], -p[1], -p[2]]
+}
+
+/// Returns the index of the largest number; of equal ones, the first.
+#[inline(always)]
+fn largest_of([p, q, r]: [f64; 3]) -> usize {
+    if p >= q && p >= r {
+        0
+    } else if q >= r {
+        1
+    } else {
+        2
+    }
+}
+
+/// Returns the power of two that scales a positive number into [1, 2); exact for normal numbers below 2^1023.
+fn reciprocal_exponent(x: f64) -> f64 {
+    let exponent = x.to_bits() >> 52 & 0x7ff;
+    f64::from_bits(2046_u64.saturating_sub(exponent) << 52)
 }

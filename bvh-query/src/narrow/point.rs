@@ -6,12 +6,12 @@
 //! the bounds. The general routine is only needed for the search for a better lower bound, which is rare.
 
 use super::candidates::{self as vectors, Foot, Vectors, everywhere};
-use super::distance::{
-    Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, largest_of, negated, perpendicular_part,
-    reciprocal_exponent,
-};
+use super::distance::{Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, perpendicular_part};
 use super::intersect::triangle_contains;
-use super::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, triangle_distance};
+use super::{
+    Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, largest_of, negated, reciprocal_exponent,
+    triangle_distance,
+};
 use crate::isa::Isa;
 use crate::isa::corners::Corners;
 

@@ -16,11 +16,11 @@
 //! The ends of an edge are sorted first. So the two triangles at an edge give the same bits for the point where it meets a
 //! third one.
 
-use super::distance::{longest, negated, perpendicular_normal, reciprocal_exponent, times};
+use super::distance::{longest, perpendicular_normal, times};
 use super::integers::{cross as cross_exactly, dot as dot_exactly, exponent, integer, minus, quotient};
 use super::intersect::{Aligned, Hull, Plane, are_collinear, area, area_axis, heights, lexicographic};
 use super::intersect::{triangle_contains, volume};
-use super::{Point, Triangle, UNIT_ROUNDOFF, dot, subtract};
+use super::{Point, Triangle, UNIT_ROUNDOFF, dot, negated, reciprocal_exponent, subtract};
 use num_bigint::BigInt;
 use std::cmp::Ordering;
 

@@ -9,6 +9,7 @@ mod from_mint;
 pub use error::PoseError;
 
 use bvh_format::instances::{departure, handedness};
+use bvh_format::vec3::dot;
 
 /// A rigid transform, from a body to the world or from B to A: a point `x` of the body is at `R x + t` in the world.
 ///
@@ -117,10 +118,6 @@ impl Pose {
         };
         [along(0), along(1), along(2)]
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::pose::Pose;
 use crate::query::answers::QueryStats;
 use crate::query::bounding_volumes::surely_apart;
 use crate::query::exact::RecentTriangles;
-use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
+use crate::query::placed_pair::{Found, PlacedPair, Visit, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::node_filter::Measure;
 use crate::traverse::stages::Stage;
@@ -96,9 +96,6 @@ pub(super) struct ContactVisitor<'a> {
     pub(super) order: Order,
     pub(super) candidates: Candidates<'a>,
 }
-
-/// What is done with a pair of triangles in contact. A reference, so that one walk is compiled for all of them.
-pub(super) type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
 
 /// Decides pairs of triangles and passes those in contact to `visit`, until it breaks.
 pub(super) struct Candidates<'a> {

@@ -15,6 +15,7 @@ use crate::traverse::walk::{Visitor, traverse};
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use std::cell::OnceCell;
+use std::ops::ControlFlow;
 
 /// Two objects in place, with everything that leaf tests need.
 pub(crate) struct PlacedPair<'a> {
@@ -95,6 +96,9 @@ impl PlacedPair<'_> {
         Ok(place.packet)
     }
 }
+
+/// What is done with a pair of triangles in contact. A reference, so that one walk is compiled for all of them.
+pub(super) type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
 
 /// A pair of triangles that a query has found.
 #[derive(Clone, Copy, Debug)]

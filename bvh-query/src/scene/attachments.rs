@@ -5,17 +5,8 @@
 
 use crate::pose::Pose;
 use crate::scene::contents::Contents;
-use crate::scene::instance::{Instance, InstanceId};
+use crate::scene::instance::{Attached, Instance, InstanceId};
 use crate::scene::{InstanceError, Scene};
-
-/// What an instance is attached to.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Attached {
-    /// The place of the parent.
-    pub(super) parent: u32,
-    /// The pose in the frame of the parent.
-    pub(super) kept: Pose,
-}
 
 /// Where an instance comes to be, and the pose that is kept if it is attached.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,6 @@
 use crate::file::files::SceneShape;
 use crate::pose::Pose;
 use crate::query::motion::{Measures, radius, size_of};
-use crate::scene::attachments::Attached;
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::{Extent, WorldBox};
@@ -41,6 +40,15 @@ impl fmt::Display for InstanceId {
             write!(f, "{}.{}", self.place, self.generation)
         }
     }
+}
+
+/// What an instance is attached to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Attached {
+    /// The place of the parent.
+    pub(super) parent: u32,
+    /// The pose in the frame of the parent.
+    pub(super) kept: Pose,
 }
 
 /// A placed shape.

@@ -21,6 +21,7 @@ use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
 use bvh_format::realign::{Form, upper_form};
+use bvh_format::vec3::dot;
 
 type Point = [f64; 3];
 
@@ -201,10 +202,6 @@ fn direction(triangle: &[Point; 3], point: Point) -> Option<Point> {
     let length = dot(d, d).sqrt();
     let unit = d.map(|x| x / length * (1.0 - 2f64.powi(-40)));
     unit.iter().all(|x| x.is_finite()).then_some(unit)
-}
-
-fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// Returns the closest point of a triangle, to within rounding: Ericson, Real-Time Collision Detection, 5.1.5.

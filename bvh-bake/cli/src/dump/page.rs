@@ -3,9 +3,9 @@
 use super::{Contents, children};
 use crate::console::{Record, hex, record};
 use bvh_bake::FileError;
-use bvh_format::decode::decode_child;
 use bvh_format::kdop::Kdop;
 use bvh_format::object::Object;
+use bvh_format::page::decode::decode_child;
 use bvh_format::page::{NO_PARENT, Page};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::Child;

@@ -5,6 +5,7 @@
 //! length, so a step as long as the distance exceeds the gap never goes too far. The random numbers have a constant
 //! seed and distances have the same bits everywhere, so poses and motions are the same everywhere, too.
 
+use bvh_format::vec3::{cross, dot};
 use bvh_query::{Bvh, Motion, Pose, Querier, QueryError};
 
 /// How poses are made, with the gaps of [`POSE_GAPS`].
@@ -116,14 +117,6 @@ fn sphere(bvh: &Bvh) -> ([f64; 3], f64) {
     let record = object.record();
     let centre = [0, 1, 2].map(|a| record.origin[a].get() + f64::from(record.sphere_centre[a].get()));
     (centre, record.sphere_radius.get().into())
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// A linear congruential generator: what matters here is that the numbers can be reproduced, not their quality.

@@ -13,6 +13,7 @@ use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::side::OpenObject;
 use crate::query::querier::Querier;
+use bvh_format::vec3::length;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -215,10 +216,6 @@ impl Line<'_> {
         let nowhere = Depths { a: -1.0, b: -1.0, closest: [[0.0; 3]; 2] };
         Balls { centre: [0.0; 3], depths: nowhere, error: 4.0 * self.error, bound: 0.0 }
     }
-}
-
-pub(super) fn length(v: Point) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
 /// Returns the centre and the half sides of the box in which both shapes are; none if there is no such box.

@@ -1,27 +1,9 @@
-//! The straight ways on which B leaves A.
-//!
-//! ```text
-//! at := 0, or what is known to be covered; while at < limit:
-//!     if pairs of triangles certainly cross at `at`: go on to where the last of them has left
-//!     else if the shapes are apart a few roundings around where the last contact at `at` leaves: that place is free
-//!     else if interiors certainly meet for some way: go on by that
-//!     else go on to where the last contact has left, and some roundings more each time
-//! ```
-//!
-//! A search for any free place first steps over fine meshes: while the shapes meet at a place further on, it goes there, and each
-//! step is longer than the one before.
-//!
-//! A way is covered as far as the first two kinds of steps lead without a gap: interiors meet on all of it. The free place is
-//! free because exact arithmetic says so of the pose there, and of nothing else.
+//! Two shapes, and a line that one of them moves on.
 
-use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::narrow::{Point, Triangle, UNIT_ROUNDOFF, dot, subtract, triangle_distance};
+use crate::narrow::Point;
 use crate::pose::Pose;
-use crate::query::answers::{Distance, Relation};
-use crate::query::depth::leaving::Leaving;
 use crate::query::motion::radius;
-use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
 use crate::traverse::placement::POSE_ERROR;
 
@@ -47,47 +29,10 @@ pub(super) struct Line<'a> {
     pub(super) grain: f64,
 }
 
-/// Where a way comes free.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Free {
-    /// Interiors are disjoint at this move.
-    pub(super) at: f64,
-    /// The contact that was the last to leave, if one was met.
-    pub(super) last: Option<LastContact>,
-}
-
-/// The contact that was the last to leave on a way.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LastContact {
-    /// The unit normal of the facet through which the way left it.
-    pub(super) normal: Point,
-    /// Where the triangles met last, in A's frame.
-    pub(super) point: Point,
-    /// The triangles of A and of B, with B not moved.
-    pub(super) triangles: [Triangle; 2],
-}
-
 /// With u for 2^-53, both places of a coordinate take 3 u of how far the corner is from B's origin, u of the sum with the
 /// translation, u of the translation, and 2 u of the way in it, which is a product with a sum. That is at most 8 u of the distance, the
 /// first translation and the length of the way, which has a percent to spare.
 const PLACING_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
-
-/// The places that are tried: before a contact has certainly left, by parts of what is charged for roundings there, and after it,
-/// in errors of placing.
-const PARTS: [f64; 2] = [7.0 / 8.0, 1.0 / 2.0];
-const STEPS: [f64; 3] = [0.0, 8.0, 64.0];
-
-/// The number of points that are tried to find one that is inside both shapes.
-const COMMON_POINTS: u32 = 64;
-
-/// A rough search only looks at places on a way that is longer than so many triangles, each step longer than the last one by a
-/// factor. Where it comes free it goes back and divides the step, until that is worth no more than a few crossings.
-const MANY_TRIANGLES: f64 = 8.0;
-const GROWTH: f64 = 1.5;
-const FEW_CROSSINGS: f64 = 4.0;
-
-/// The part of the size by which a common point has to bring a way on.
-const LEAST_PART: f64 = 2e-7;
 
 impl<'a> Line<'a> {
     pub(super) fn new(a: Shape<'a>, b: Shape<'a>, pose: &'a Pose) -> Self {
@@ -127,22 +72,6 @@ impl<'a> Line<'a> {
         self.direction.map(|d| at * d)
     }
 
-    /// Returns the last of the contacts that were found at a place.
-    fn last_contact(&self, at: f64, leaving: &Leaving) -> Option<LastContact> {
-        let until = leaving.touches_until?;
-        let [a, b] = leaving.last;
-        let moved = |by: f64| b.map(|corner| [0, 1, 2].map(|k| corner[k] + by * self.direction[k]));
-        let point = triangle_distance(&a, &moved(until)).point_a;
-        Some(LastContact { normal: leaving.normal, point, triangles: [a, moved(-at)] })
-    }
-
-    /// Returns about what [`stretch`](crate::narrow::stretch) charges for roundings where a contact leaves through a facet.
-    fn charge(&self, normal: Point) -> f64 {
-        let magnitude = normal[0].abs() + normal[1].abs() + normal[2].abs();
-        let rate = dot(normal, self.direction).max(f64::MIN_POSITIVE);
-        magnitude * (self.placing + 16.0 * UNIT_ROUNDOFF * self.length) / rate
-    }
-
     /// Returns the pose of B at a place.
     pub(super) fn pose_at(&self, at: f64) -> Pose {
         moved(self.pose, self.translation_at(at))
@@ -153,139 +82,4 @@ impl<'a> Line<'a> {
 pub(super) fn moved(pose: &Pose, translation: Point) -> Pose {
     let from = pose.translation();
     Pose::of_valid(*pose.rotation(), [0, 1, 2].map(|k| from[k] + translation[k]))
-}
-
-/// Where two cores are that do not touch.
-struct Gap {
-    distance: f64,
-    lower: f64,
-    point_a: Point,
-    point_b: Point,
-    /// From A to B.
-    normal: Point,
-}
-
-impl Gap {
-    /// Returns how far B moves until the two closest points are as far apart as both radii.
-    fn way_out(&self, line: &Line<'_>) -> f64 {
-        let along = self.distance * dot(self.normal, line.direction);
-        let squared = along * along - self.distance * self.distance + line.radii * line.radii;
-        squared.max(0.0).sqrt() - along + 16.0 * line.error
-    }
-
-    fn contact(&self, line: &Line<'_>, at: f64) -> LastContact {
-        let back = line.translation_at(-at);
-        let point_b = [0, 1, 2].map(|k| self.point_b[k] + back[k]);
-        LastContact { normal: self.normal, point: self.point_a, triangles: [[self.point_a; 3], [point_b; 3]] }
-    }
-}
-
-impl Querier {
-    /// Returns the first place that is found on a line, before `limit`, where interiors are certainly disjoint. They are known to
-    /// meet at all moves shorter than `from`. A rough search may pass over places that are free for a part of the way to them.
-    pub(super) fn free_on(
-        &mut self,
-        line: &Line<'_>,
-        from: f64,
-        limit: f64,
-        is_rough: bool,
-    ) -> Result<Option<Free>, QueryError> {
-        let (mut at, mut last, mut stuck) = (from, None, 1.0);
-        let mut step = if is_rough && limit > MANY_TRIANGLES * line.grain { line.grain / 4.0 } else { 0.0 };
-        let mut least = 0.0;
-        while at < limit && at <= line.length {
-            while step > least && at < limit {
-                if self.relation_of(line.a, line.b, &line.pose_at(at + step))? == Relation::Apart {
-                    (step, least) = (step / FEW_CROSSINGS, line.grain);
-                } else {
-                    (at, step) = (at + step, step * GROWTH);
-                }
-            }
-            let leaving = self.leaving(line, at)?;
-            let touches = leaving.touches_until.is_some();
-            last = if touches { line.last_contact(at, &leaving) } else { last };
-            if leaving.crosses_until > line.placing {
-                at += leaving.crosses_until;
-                least = FEW_CROSSINGS * leaving.crosses_until;
-                continue;
-            }
-            let until = at + leaving.touches_until.unwrap_or(0.0);
-            let charge = line.charge(leaving.normal);
-            let [near, nearer] = PARTS.map(|part| (until - part * charge).max(at));
-            let [first, second, third] = STEPS.map(|step| until + step * stuck * line.placing);
-            let mut places = [near, nearer, first, second, third];
-            if line.radii > 0.0
-                && let Some(gap) = self.gap_of_cores(line, at)?
-            {
-                last = Some(gap.contact(line, at));
-                places[0] = at + gap.way_out(line);
-            }
-            let mut tried = f64::NAN;
-            for place in places.into_iter().filter(|&place| place < limit) {
-                if place != std::mem::replace(&mut tried, place)
-                    && self.relation_of(line.a, line.b, &line.pose_at(place))? == Relation::Apart
-                {
-                    return Ok(Some(Free { at: place, last }));
-                }
-            }
-            let way = self.common_way(line, at, touches)?;
-            (at, stuck) = if way > 0.0 {
-                (at + way, 1.0)
-            } else {
-                (until + STEPS[STEPS.len() - 1] * stuck * line.placing, 4.0 * stuck)
-            };
-        }
-        Ok(None)
-    }
-
-    /// Returns how far interiors meet without a gap, up to the end of a way.
-    pub(super) fn cover(&mut self, line: &Line<'_>, end: f64) -> Result<f64, QueryError> {
-        let mut covered = 0.0;
-        while covered < end {
-            let leaving = self.leaving(line, covered)?;
-            let way = if leaving.crosses_until > line.placing {
-                leaving.crosses_until
-            } else {
-                self.common_way(line, covered, leaving.touches_until.is_some())?
-            };
-            if way <= 0.0 {
-                break;
-            }
-            covered += way;
-        }
-        Ok(covered.min(end))
-    }
-
-    /// Returns where the cores are at a place, unless they touch.
-    fn gap_of_cores(&mut self, line: &Line<'_>, at: f64) -> Result<Option<Gap>, QueryError> {
-        let Distance { distance, lower, upper, point_a, point_b, .. } =
-            self.distance_of_cores(line.a, line.b, &line.pose_at(at))?;
-        if distance <= line.error {
-            return Ok(None);
-        }
-        let normal = subtract(point_b, point_a).map(|x| x / distance);
-        Ok(Some(Gap { distance: upper, lower, point_a, point_b, normal }))
-    }
-
-    /// Returns how far B moves at least, from a place on where no triangles certainly cross, until interiors do not meet; 0 if that
-    /// is not known, or hardly any way. Rounded shapes meet until the gap of their cores is as wide as both radii. If nothing
-    /// touches and neither has a radius, one shape or a part of it is inside the other, and stays there until the gap is closed.
-    fn common_way(&mut self, line: &Line<'_>, at: f64, touches: bool) -> Result<f64, QueryError> {
-        let pose = line.pose_at(at);
-        let is_enough = |way: &f64| *way > LEAST_PART * line.size;
-        if !touches && let Some(gap) = self.gap_of_cores(line, at)? {
-            let way = if line.radii > 0.0 {
-                line.radii - gap.distance
-            } else if self.relation_of(line.a, line.b, &pose)? == Relation::Apart {
-                return Ok(0.0);
-            } else {
-                gap.lower
-            };
-            if let Some(way) = Some(way - 4.0 * line.error).filter(is_enough) {
-                return Ok(way);
-            }
-        }
-        let balls = self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?;
-        Ok(Some(balls.lower()).filter(is_enough).unwrap_or(0.0))
-    }
 }

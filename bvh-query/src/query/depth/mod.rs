@@ -2,6 +2,7 @@
 
 mod balls;
 pub(crate) mod clash;
+mod free;
 mod leaving;
 mod line;
 pub(crate) mod penetration;

@@ -10,12 +10,14 @@ use crate::file::shape::Shape;
 use crate::narrow::{Point, Triangle, cross, dot, subtract};
 use crate::pose::Pose;
 use crate::query::answers::Relation;
-use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds, length};
-use crate::query::depth::line::{Free, LastContact, Line, moved};
+use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
+use crate::query::depth::free::{Free, LastContact};
+use crate::query::depth::line::{Line, moved};
 use crate::query::depth::planes::{Plane, shortest_beyond};
 use crate::query::options::check;
 use crate::query::querier::Querier;
 use bvh_format::kdop::FACTORS;
+use bvh_format::vec3::length;
 
 /// How far B moves along a direction until interiors are disjoint.
 #[derive(Debug, Clone, Copy, PartialEq)]

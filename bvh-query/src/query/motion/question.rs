@@ -7,10 +7,11 @@ use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::MotionOptions;
-use crate::query::motion::search::MAX_DEPTH;
 use crate::query::rounded::limit_of_cores;
 use bvh_format::object::Object;
 
+/// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
+pub(super) const MAX_DEPTH: u32 = 45;
 /// The default tolerance, as a fraction of the diagonal of the smaller object's box.
 const DEFAULT_TOLERANCE: f64 = 1e-6;
 /// The least default tolerance, as a fraction of how far vertices are from the origins of both frames: 2^-38. A cell has to

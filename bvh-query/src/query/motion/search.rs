@@ -19,7 +19,7 @@ use crate::error::{NumberError, QueryError};
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::pairs::{Kept, Sweep};
-use crate::query::motion::question::{Middle, Question, Stretch};
+use crate::query::motion::question::{MAX_DEPTH, Middle, Question, Stretch};
 use crate::query::motion::sweep::Room;
 use crate::query::placed_pair::each_pair;
 use crate::query::querier::Querier;
@@ -40,8 +40,6 @@ const FINE: f64 = 1.0 / 4096.0;
 const LEAST_GUESSED: f64 = 16.0;
 /// The most intervals that may wait while a search for any hit takes long intervals first.
 const MOST_SPREAD: usize = 64;
-/// How often time may be halved: the middle of a cell is an `f64`, and far from rounding.
-pub(super) const MAX_DEPTH: u32 = 45;
 /// Bounds how close to a guessed contact several intervals are swept together. From the end of such a group to the
 /// contact, B must still move by at least this many times the gap that a sweep of the group needs. The value only
 /// divides the work; it affects no answer.

@@ -3,6 +3,7 @@
 use crate::narrow::{MAX_POINTS, UNIT_ROUNDOFF, cross, dot, subtract, unit};
 use crate::query::patches::join::Vertices;
 use crate::query::regions::{ContactRegion, RegionKind};
+use bvh_format::vec3::length;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 
@@ -171,10 +172,6 @@ impl Polygon {
         }
         Self { area: mean.weight, center: mean.value().unwrap_or(from) }
     }
-}
-
-fn length(v: Vector) -> f64 {
-    dot(v, v).sqrt()
 }
 
 fn add(sum: &mut Vector, weight: f64, v: Vector) {

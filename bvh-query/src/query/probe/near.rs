@@ -7,8 +7,8 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::TrianglePlace;
 use crate::traverse::budget::Budget;
-use bvh_format::decode::decode_page;
 use bvh_format::object::Object;
+use bvh_format::page::decode::decode_page;
 use bvh_format::treelet::Child;
 use std::collections::BTreeSet;
 

@@ -3,14 +3,14 @@
 //! Places ascend, and so do the packets of pages. A cursor goes through the pages once, and skips those between two
 //! places in steps that double, so a short list costs a few pages.
 
-use super::{LANES, Net, ObjectTopology, boundary_of, visit_list};
+use super::packets;
 use crate::error::ensure;
 use crate::layout::Layout;
 use crate::leaf::{VertexBlock, decode_triangle};
 use crate::object::Object;
 use crate::rule::Rule;
 use crate::source::{Block, PageBytes, Source};
-use crate::validate::packets;
+use crate::topology::{LANES, Net, ObjectTopology, boundary_of, visit_list};
 use zerocopy::little_endian::U32;
 
 /// Checks that each place in an object's lists is that of a triangle, and that a closed object has no boundary. `sum` is

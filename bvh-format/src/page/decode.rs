@@ -2,7 +2,7 @@
 //!
 //! It follows section 8 of `spec/format.md` step by step, and it is the oracle for every vector backend.
 
-use crate::page::Page;
+use super::reader::Page;
 use crate::profile::{Encoding, Profile};
 use crate::quantize::{decode_max, decode_min, residual_unit};
 use crate::slabs::{NodeSlabs, row};
