@@ -506,18 +506,16 @@ mod tests {
         }
     }
 
+    fn packed_head(packets: &[Packet]) -> PackedHead {
+        let block = encode_block(TriangleEncoding::Packed, packets, &in_order(packets), &SUMS, &[]);
+        PackedHead::read(&block).unwrap()
+    }
+
     #[test]
     fn a_grid_takes_the_bits_of_its_extent() {
         // 16 steps of 2^-10 far from zero take 4 bits per axis, whatever the magnitude.
         let packets = packets(3, 40, |r| 100.0 + (r % 16) as f32 / 1024.0);
-        let head = PackedHead::read(&encode_block(
-            TriangleEncoding::Packed,
-            &packets,
-            &in_order(&packets),
-            &SUMS,
-            &[],
-        ))
-        .unwrap();
+        let head = packed_head(&packets);
         assert_eq!((head.bits, head.kinds, head.exponent), ([4, 4, 4], 0b01_01_01, [-10; 3]));
     }
 
@@ -525,14 +523,7 @@ mod tests {
     fn printed_decimals_take_the_bits_of_their_last_digit() {
         // A thousand steps of 10^-5: as bits of `f32` they take more than twice as many.
         let packets = packets(3, 40, |r| ((r % 1000) as f64 / 1e5 - 0.003) as f32);
-        let head = PackedHead::read(&encode_block(
-            TriangleEncoding::Packed,
-            &packets,
-            &in_order(&packets),
-            &SUMS,
-            &[],
-        ))
-        .unwrap();
+        let head = packed_head(&packets);
         assert_eq!((head.bits, head.kinds, head.exponent), ([10; 3], 0b10_10_10, [5; 3]));
     }
 

@@ -5,6 +5,7 @@ mod object;
 pub(crate) mod provenance;
 pub(crate) mod report;
 
+use crate::bake::provenance::value_of;
 use crate::check::open_edges::{count_all, count_object};
 use crate::check::prove::prove;
 use crate::error::{BakeError, LimitError, excerpt};
@@ -114,7 +115,7 @@ fn check_numbers(options: &Options) -> Result<(), BakeError> {
 fn stating_moves<'a>(provenance: &'a str, options: &Options) -> Cow<'a, str> {
     let mut text = Cow::Borrowed(provenance);
     let mut state = |key: &str, value: String| {
-        if !text.lines().any(|line| line.strip_prefix(key).is_some_and(|rest| rest.starts_with('='))) {
+        if value_of(&text, key).is_none() {
             let end = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
             text = Cow::Owned(format!("{text}{end}{key}={value}\n"));
         }

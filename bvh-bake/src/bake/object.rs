@@ -15,7 +15,6 @@ use crate::storage::external_sort::Sorter;
 use crate::storage::resources::Resources;
 use crate::topology::{MAX_FEW_PARTS, Nets, Survey};
 use crate::tree::{Aabb, Bricks};
-use crate::triangles::placement::Moved;
 use crate::triangles::{Gathered, Kept};
 use bvh_format::kdop::Kdop;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
@@ -111,7 +110,6 @@ impl Built {
         let Prepared { gathered, measured, mut surveyed, nets, left_out, .. } = prepared;
         let Gathered { name, behind, stream, moved, welded, vertices, is_cloud } = gathered;
         let moved = moved.joined(measured.moved).rounded_up();
-        let welded = Moved { rounding: welded, ..Moved::default() }.rounded_up().rounding;
         let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
         let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
@@ -143,7 +141,7 @@ impl Built {
             triangles: triangles.into(),
             packets: encoded.packets.into(),
             treelets: encoded.treelets.into(),
-            max_vertex_rounding: sum_up(welded, moved.rounding).into(),
+            max_vertex_rounding: sum_up(welded.rounded_up().rounding, moved.rounding).into(),
             max_quantization_error: moved.quantization.into(),
             input_triangles: id_count.into(),
             degenerate: surveyed.degenerate.into(),

@@ -8,7 +8,7 @@ use crate::storage::output::OutputSource;
 use bvh_format::Layout;
 use bvh_format::checksum::checksum;
 use bvh_format::header::{MAJOR, MINOR, SectionKind};
-use bvh_format::source::Source as _;
+use bvh_format::source::Source;
 use bvh_format::validate::check_sections;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -59,11 +59,9 @@ impl Provenance {
 
     /// Returns true if a provenance text has all lines of the stamp and no other checksum.
     fn matches(&self, text: &str) -> bool {
-        let found = |key: &str| {
-            text.lines().filter_map(|line| line.split_once('=')).find(|(k, _)| *k == key).map(|(_, v)| v)
-        };
-        self.stamp.iter().all(|(key, value)| found(key) == Some(value))
-            && (found("mesh_xxh3").is_none() || self.stamp.iter().any(|(key, _)| *key == "mesh_xxh3"))
+        self.stamp.iter().all(|(key, value)| value_of(text, key) == Some(value))
+            && (value_of(text, "mesh_xxh3").is_none()
+                || self.stamp.iter().any(|(key, _)| *key == "mesh_xxh3"))
     }
 }
 
@@ -86,11 +84,8 @@ pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Prog
     let length = file.metadata().ok()?.len();
     let source = OutputSource::File { file: &file, path: output, length, progress };
     let layout = Layout::read_from(&source).ok()?;
-    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance)?;
-    // The texts of this baker are short.
-    let range = section.range.start..section.range.end.min(section.range.start + MAX_TEXT);
-    let text = source.read(range).ok()?;
-    let same = layout.version == (MAJOR, MINOR) && provenance.matches(std::str::from_utf8(&text).ok()?);
+    let text = text_of(&layout, &source).ok()??;
+    let same = layout.version == (MAJOR, MINOR) && provenance.matches(&text);
     // A damaged file is baked again.
     if !same || check_sections(&layout, &source).is_err() {
         return None;
@@ -100,5 +95,18 @@ pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Prog
     Some(FileSummary::new(&layout, length, instances, &topology))
 }
 
-/// The most bytes of a provenance text that are read.
+/// The most bytes of a provenance text that are read. The texts of this baker are short.
 const MAX_TEXT: usize = 1 << 20;
+
+/// Returns the provenance text of a file; `None` if it has none, or one that is no text.
+pub(crate) fn text_of<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<Option<String>, S::Error> {
+    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance);
+    let Some(section) = section else { return Ok(None) };
+    let range = section.range.start..section.range.end.min(section.range.start + MAX_TEXT);
+    Ok(String::from_utf8(source.read(range)?.into_owned()).ok())
+}
+
+/// Returns the value of a key in such a text.
+pub(crate) fn value_of<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    text.lines().filter_map(|line| line.split_once('=')).find(|(k, _)| *k == key).map(|(_, value)| value)
+}

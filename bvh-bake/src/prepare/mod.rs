@@ -150,8 +150,8 @@ pub(crate) fn survey(
             (a, b) => a.or(b),
         };
     }
-    // Differences of f32 in f64, sums with what is left out, three squares, two sums and a root each round by at most 2^-53 relative. The factor 1
-    // + 2^-40 covers these, and the next f32 covers the last rounding.
+    // Differences of f32 in f64, sums with what is left out, three squares, two sums and a root each round by at most 2^-53 of
+    // themselves. The factor 1 + 2^-40 covers these, and the next f32 covers the last rounding.
     all.radius = ((squared.sqrt() * (1.0 + 2f64.powi(-40))) as f32).next_up();
     Ok(all)
 }

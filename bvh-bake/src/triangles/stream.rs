@@ -53,8 +53,8 @@ pub(crate) struct Gathered {
     pub(crate) stream: TriangleStream,
     /// The largest distances by which vertices moved, as far as they have been measured.
     pub(crate) moved: Moved,
-    /// The largest distance by which welding moved a vertex before that.
-    pub(crate) welded: f64,
+    /// How far welding moved vertices before that.
+    pub(crate) welded: Moved,
     /// The number of distinct vertices that the input's triangles refer to.
     pub(crate) vertices: u64,
     /// Whether all triangles are points.

@@ -389,7 +389,8 @@ cbvh_status cbvh_bake_voxels(const int32_t *cells, size_t count, double side, cb
  * multiples of it. */
 cbvh_status cbvh_bake_octree(const int32_t *cells, const uint32_t *sizes, size_t count, double side, cbvh_mesh *mesh);
 /* Bakes the convex hull of points, decided exactly. Its vertices are some of the points. Each point is inside it or on
- * it. CBVH_INVALID_ARGUMENT if all points are in one plane, as fewer than 4 always are, and for a coordinate that is not finite or beyond 2^120. */
+ * it. CBVH_INVALID_ARGUMENT if all points are in one plane, as fewer than 4 always are, and for a coordinate that is
+ * not finite or beyond 2^120. */
 cbvh_status cbvh_bake_convex_hull(const double *points, size_t count, cbvh_mesh *mesh);
 
 /* -------------------------------------------------------------------------------------------------------- queriers */

@@ -163,6 +163,13 @@ impl RigidPath for AskedPath {
             }
         }
     }
+
+    fn slides(&self, t0: f64, t1: f64) -> bool {
+        match &*self.path {
+            PathValue::Known(path) => path.slides(t0, t1),
+            PathValue::Caller(_) => false,
+        }
+    }
 }
 
 /// Makes a path, and hands it out.

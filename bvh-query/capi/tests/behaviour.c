@@ -539,6 +539,17 @@ static void paths(void) {
     const cbvh_motion_options coarse = {.size = sizeof coarse, .tolerance = 0.125};
     OK(cbvh_edge_motions(querier, mesh, mesh, &hair_start, &hair_end, 1, &coarse, edges));
     CHECK(edges[0].outcome == CBVH_NEAR && edges[0].nearest.distance > 0 && edges[0].nearest.distance <= 0.125);
+    /* Nor is a rounding, along all of a slide: few intervals show that. */
+    const double rounding = nextafter(1, 2);
+    const cbvh_pose slide_start = shift(-4, rounding, 0), slide_end = shift(4, rounding, 0);
+    cbvh_path slide;
+    OK(cbvh_path_between(&slide_start, &slide_end, &slide));
+    OK(cbvh_querier_set_budget(querier, 1 << 14));
+    OK(cbvh_motions(querier, mesh, mesh, &slide, 1, NULL, answers));
+    OK(cbvh_edge_motions(querier, mesh, mesh, &slide_start, &slide_end, 1, NULL, edges));
+    CHECK(answers[0].outcome == CBVH_NEAR && edges[0].outcome == CBVH_NEAR && answers[0].at == edges[0].at);
+    OK(cbvh_querier_set_budget(querier, UINT64_MAX));
+    OK(cbvh_path_free(slide));
     double reach, moved;
     OK(cbvh_path_reach(mesh, between, 0, 1, &reach));
     CHECK(reach >= 4 && reach < 4.001);

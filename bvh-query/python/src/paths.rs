@@ -334,4 +334,8 @@ impl RigidPath for AnyPath {
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
         self.path().sagitta(radius, t0, t1)
     }
+
+    fn slides(&self, t0: f64, t1: f64) -> bool {
+        self.path().slides(t0, t1)
+    }
 }

@@ -3,8 +3,10 @@
 mod attached;
 mod linear;
 mod path;
+mod polyline;
 mod relative;
 
 pub(crate) use attached::{AttachedPath, TogetherPath};
-pub use path::{Motion, PathError, Polyline, RigidPath};
+pub use path::{Motion, PathError, RigidPath};
+pub use polyline::Polyline;
 pub use relative::RelativePath;

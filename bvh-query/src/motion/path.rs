@@ -1,4 +1,4 @@
-//! Paths: where B is at each time, and how far its points are from straight lines in between.
+//! Paths: where B is at each time, and how far its points are from straight lines in between; and the path at constant rates.
 
 use crate::motion::linear::{Matrix, difference, length, norm, transposed};
 use crate::pose::frames::{product, turn};
@@ -96,7 +96,7 @@ pub enum PathError {
 /// poses, or a [`Motion::screw`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    start: Pose,
+    pub(super) start: Pose,
     end: Pose,
     /// The rotation at the start; between poses, the nearest orthonormal one.
     rotation: Matrix,
@@ -239,7 +239,7 @@ impl Motion {
     }
 
     /// Returns how far rounding may move a point within `radius` of B's origin from its ideal place.
-    fn rounding(&self, radius: f64) -> f64 {
+    pub(super) fn rounding(&self, radius: f64) -> f64 {
         let sum = |v: [f64; 3]| v.iter().map(|x| x.abs()).sum::<f64>();
         let ends = sum(self.start.translation()) + sum(self.end.translation());
         // The angle is rounded before its sine is taken.
@@ -253,7 +253,7 @@ impl Motion {
     }
 
     /// Returns how far any point within `radius` of B's origin moves at most, between two poses.
-    fn way(&self, radius: f64) -> f64 {
+    pub(super) fn way(&self, radius: f64) -> f64 {
         let (from, to) = (self.start.translation(), self.end.translation());
         let line = length([0, 1, 2].map(|k| to[k] - from[k]));
         let defects = norm(&difference(&self.defects[1], &self.defects[0]));
@@ -305,7 +305,7 @@ impl RigidPath for Motion {
 
 /// Returns the sagitta of a path for any numbers, given what it is for radii of at least 0 and times in their order from 0
 /// to 1.
-fn sagitta_of(
+pub(super) fn sagitta_of(
     path: &impl RigidPath,
     radius: f64,
     times: [f64; 2],
@@ -327,93 +327,6 @@ fn sagitta_of(
     let turned = norm(&difference(end.rotation(), start.rotation()));
     let moved = length([0, 1, 2].map(|k| end.translation()[k] - start.translation()[k])) + turned * radius;
     inside + moved * (outside / (t1 - t0)).min(1.0) * (1.0 + 1.0 / (1u64 << 40) as f64)
-}
-
-/// A path through several poses. The motion from each pose to the next takes the same share of the time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Polyline {
-    motions: Vec<Motion>,
-}
-
-impl Polyline {
-    /// Returns the path through the poses, with [`Motion::between`] from each to the next.
-    ///
-    /// # Errors
-    /// [`PathError::TooFewPoses`] for fewer than two poses, and the errors of [`Motion::between`].
-    pub fn new(poses: &[Pose]) -> Result<Self, PathError> {
-        if poses.len() < 2 {
-            return Err(PathError::TooFewPoses(poses.len()));
-        }
-        let motions = poses.windows(2).map(|pair| Motion::between(&pair[0], &pair[1]));
-        Ok(Self { motions: motions.collect::<Result<_, _>>()? })
-    }
-
-    /// Returns the number of the motion at a time, and the time within it.
-    fn at(&self, t: f64) -> (usize, f64) {
-        let scaled = t.clamp(0.0, 1.0) * self.motions.len() as f64;
-        let number = (scaled as usize).min(self.motions.len() - 1);
-        (number, scaled - number as f64)
-    }
-
-    /// Returns how far any point within `radius` of B's origin is from the straight line between two poses, in the
-    /// first pose of the motion with this number.
-    fn bend(&self, number: usize, radius: f64, [t0, t1]: [f64; 2], [from, to]: &[Pose; 2]) -> f64 {
-        let share = (number as f64 / self.motions.len() as f64 - t0) / (t1 - t0);
-        let between = |from: f64, to: f64, at: f64| at - (from + share * (to - from));
-        let knot = &self.motions[number].start;
-        let (mut moved, mut turned) = (0.0, 0.0);
-        for i in 0..3 {
-            let ends = (from.translation()[i], to.translation()[i]);
-            moved += between(ends.0, ends.1, knot.translation()[i]).powi(2);
-            for j in 0..3 {
-                let ends = (from.rotation()[i][j], to.rotation()[i][j]);
-                turned += between(ends.0, ends.1, knot.rotation()[i][j]).powi(2);
-            }
-        }
-        moved.sqrt() + turned.sqrt() * radius
-    }
-
-    /// The path is within the largest sagitta of its motions of the polygon through the knots, and this polygon is
-    /// farthest from the straight line at a knot.
-    fn sagitta_within(&self, radius: f64, [t0, t1]: [f64; 2]) -> f64 {
-        let ((first, from), (mut last, mut to)) = (self.at(t0), self.at(t1));
-        if to == 0.0 && last > first {
-            // The end of one motion is the start of the next, to the bit.
-            (last, to) = (last - 1, 1.0);
-        }
-        // The time within a motion is rounded, by less than this share of it.
-        let slack = 1.0 / (1u64 << 50) as f64 * self.motions.len() as f64;
-        let of_motion = |number: usize| {
-            let start = if number == first { from } else { 0.0 };
-            let end = if number == last { to } else { 1.0 };
-            let motion = &self.motions[number];
-            motion.sagitta(radius, start, end) + 4.0 * slack * motion.way(radius) + motion.rounding(radius)
-        };
-        let bent = (first..=last).map(of_motion).fold(0.0, f64::max);
-        if first == last {
-            return bent;
-        }
-        let ends = [self.pose(t0), self.pose(t1)];
-        let knot = |number: usize| self.bend(number, radius, [t0, t1], &ends);
-        let knots = (first + 1..=last).map(knot).fold(0.0, f64::max);
-        bent + knots * (1.0 + 1.0 / (1u64 << 40) as f64)
-    }
-}
-
-impl RigidPath for Polyline {
-    fn pose(&self, t: f64) -> Pose {
-        let (number, t) = self.at(t);
-        self.motions[number].pose(t)
-    }
-
-    fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64 {
-        sagitta_of(self, radius, [t0, t1], |radius, times| self.sagitta_within(radius, times))
-    }
-
-    fn slides(&self, t0: f64, t1: f64) -> bool {
-        let ((first, _), (last, to)) = (self.at(t0), self.at(t1));
-        (first == last || first + 1 == last && to == 0.0) && self.motions[first].slides(t0, t1)
-    }
 }
 
 /// Returns the rotation by an angle about an axis of length 1 (Rodrigues' formula).
@@ -455,6 +368,7 @@ fn quaternion(r: &Matrix) -> [f64; 4] {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::motion::Polyline;
 
     fn pose(axis: [f64; 3], angle: f64, translation: [f64; 3]) -> Pose {
         let length = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -498,6 +412,14 @@ pub(super) mod tests {
         let there_and_back = [Pose::IDENTITY, sheared, Pose::IDENTITY, sheared, Pose::IDENTITY];
         for knots in 3..=5 {
             paths.push(Box::new(Polyline::new(&there_and_back[..knots]).unwrap()));
+        }
+        // Without a turn, on which nothing but translations are rounded.
+        let turned = pose(vector(state), 1.0, vector(state));
+        for far in [0.0, 1e6] {
+            let to = vector(state).map(|v| v + far);
+            let slide = Motion::between(&turned, &Pose::new(*turned.rotation(), to).unwrap()).unwrap();
+            assert!(slide.slides(0.0, 1.0) && slide.angle() == 0.0);
+            paths.push(Box::new(slide));
         }
         // Far from the origin.
         let far = |x: f64| pose([0.0, 0.0, 1.0], x, [4e6, 5e6 + x, 0.0]);
@@ -547,6 +469,33 @@ pub(super) mod tests {
         assert_eq!((motion.pose(-1.0), motion.pose(f64::INFINITY)), (motion.pose(0.0), motion.pose(1.0)));
         let line = Polyline::new(&[Pose::IDENTITY, most]).unwrap();
         assert_eq!((line.pose(f64::NAN), line.pose(9.0)), (line.pose(0.0), line.pose(1.0)));
+    }
+
+    /// Where a path slides, its rotation stays and each coordinate goes one way, to the bit. Those that turn or have a corner do not slide.
+    #[test]
+    fn what_slides_goes_one_way_along_each_axis() {
+        let state = &mut 13;
+        let turned = pose(vector(state), 1.0, [0.0; 3]);
+        let at = |to: [f64; 3]| Pose::new(*turned.rotation(), to).unwrap();
+        for _ in 0..200 {
+            let far = 10f64.powi((signed(state) * 8.0) as i32);
+            let [from, mut to] = [(); 2].map(|()| vector(state).map(|v| v * far));
+            // Along one axis hardly, along another not at all.
+            (to[0], to[1]) = (from[0].next_up().next_up(), from[1]);
+            let slide = Motion::between(&at(from), &at(to)).unwrap();
+            let bent = Polyline::new(&[at(from), at(to), at([0.0; 3])]).unwrap();
+            assert!(bent.slides(0.0, 0.5) && bent.slides(0.5, 1.0) && !bent.slides(0.25, 0.75));
+            let mut times: Vec<f64> = (0..200).map(|_| signed(state).abs()).collect();
+            times.extend([0.0, 1.0]);
+            times.sort_by(f64::total_cmp);
+            for axis in 0..3 {
+                let reached: Vec<f64> = times.iter().map(|&t| slide.pose(t).translation()[axis]).collect();
+                assert!(reached.is_sorted() || reached.iter().rev().is_sorted(), "{reached:?}");
+            }
+            assert!(times.iter().all(|&t| slide.pose(t).rotation() == turned.rotation()));
+        }
+        assert!(!Motion::between(&turned, &Pose::IDENTITY).unwrap().slides(0.0, 1.0));
+        assert!(!Motion::screw(&turned, [0.0; 3], [0.0, 0.0, 1.0], 1.0, 1.0).unwrap().slides(0.0, 1.0));
     }
 
     /// How far a random point is at most from where it would be on its way straight through a random interval of length

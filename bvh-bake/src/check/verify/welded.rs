@@ -5,6 +5,7 @@
 
 use super::input::{Input, InputCorners};
 use super::{VerifyError, source_of, tolerance};
+use crate::bake::provenance::{text_of, value_of};
 use crate::input::gather::weld::{Unwelded, Welded, wide};
 use crate::input::mesh::Instance;
 use crate::options::Rounding;
@@ -13,13 +14,9 @@ use crate::storage::resources::Resources;
 use crate::triangles::WideTriangle;
 use crate::triangles::placement::Moved;
 use bvh_format::Layout;
-use bvh_format::header::SectionKind;
 use bvh_format::source::Source;
 use bytemuck::{Pod, Zeroable};
 use std::borrow::Cow;
-
-/// The most bytes of a provenance text that are read.
-const MAX_TEXT: usize = 1 << 20;
 
 /// A triangle of the mesh.
 #[derive(Clone, Copy, Pod, Zeroable, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,17 +31,9 @@ struct Row {
 /// Returns how the coordinates of a file were rounded and the distance within which its vertices were welded, as its provenance
 /// states it; 0 if they were not.
 pub(super) fn stated<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<(Rounding, f64), S::Error> {
-    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance);
-    let Some(section) = section else { return Ok((Rounding::None, 0.0)) };
-    let range = section.range.start..section.range.end.min(section.range.start + MAX_TEXT);
-    let text = source.read(range)?;
-    let value = |key: &str| {
-        let lines = text.split(|&byte| byte == b'\n');
-        let value = lines.filter_map(|line| line.strip_prefix(key.as_bytes())?.strip_prefix(b"=")).next();
-        value.and_then(|value| std::str::from_utf8(value).ok())
-    };
-    let round = value("round").and_then(Rounding::from_name).unwrap_or_default();
-    Ok((round, value("weld").and_then(|value| value.parse().ok()).unwrap_or(0.0)))
+    let text = text_of(layout, source)?.unwrap_or_default();
+    let round = value_of(&text, "round").and_then(Rounding::from_name).unwrap_or_default();
+    Ok((round, value_of(&text, "weld").and_then(|value| value.parse().ok()).unwrap_or(0.0)))
 }
 
 /// The mesh, welded.
@@ -78,7 +67,7 @@ impl<'a> WeldedInput<'a> {
         let given = given.finish();
         let mut given = Ahead::of(&given)?;
         let mut rows = Sorter::of_runs(run);
-        let mut most = 0.0f64;
+        let mut most = Moved::default();
         for (number, object) in (0..).zip(&layout.objects) {
             let mut triangles = Unwelded::new();
             while let Some(row) = given.next_if(|row| row.order[0] == number)? {
@@ -94,18 +83,18 @@ impl<'a> WeldedInput<'a> {
                 rows.extend(&wide(&part)?.iter().map(row).collect::<Vec<_>>(), &spill)?;
             }
             let stated = tolerance(object);
-            if moved > stated {
+            if moved.rounding > stated {
                 let what = format!("the weld of object {number} within {distance:e}");
                 let found = format!("a stated move of at most {stated:e}");
-                return Err(VerifyError::differs(what, format!("a move of {moved:e}"), found));
+                return Err(VerifyError::differs(what, format!("a move of {:e}", moved.rounding), found));
             }
-            most = most.max(moved);
+            most = most.joined(moved);
         }
         Ok(Self {
             counts: input.counts(),
             instances: input.instances(),
             rows: rows.finish(),
-            moved: most + rounded.rounding,
+            moved: most.rounding + rounded.rounding,
         })
     }
 }

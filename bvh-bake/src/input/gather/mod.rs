@@ -403,7 +403,7 @@ impl<'a> Gatherer<'a> {
             let name = names.next().unwrap_or_default();
             // A single object keeps its name; several objects that are joined have no name.
             let name = if split || names.next().is_none() { name } else { String::new() };
-            let mut welded = 0.0;
+            let mut welded = Moved::default();
             if weld::check(weld, &name, body.extent.diagonal())? {
                 let made = weld::weld(body.parts, &body.extent, body.is_cloud, weld, resources, &spill)?;
                 (body.parts, body.extent, body.is_cloud) = (made.parts, made.extent, made.is_cloud);

@@ -100,8 +100,8 @@ def bake(
     number, ties to even, as games store them: coordinates that are equal in two meshes then stay equal.
 
     Answers are exact for the numbers that are given, which are stored as they are, float64 numbers too. Vertices move only if that
-    is asked for: with ``round``, ``weld`` or ``triangles="quantized"``, by up to ``max_error``. Then answers are exact for the mesh as
-    stored, and `Mesh.max_move` states by how much it differs.
+    is asked for: with ``round``, with ``weld``, or with ``triangles="quantized"`` by up to ``max_error``. Then answers are exact for
+    the mesh as stored, and `Mesh.max_move` states by how much it differs.
     """
     points = _cbvh.copied_numbers(vertices, "vertices")
     try:

@@ -25,6 +25,7 @@ use crate::storage::resources::Resources;
 use crate::threads;
 use crate::triangles::placement::{Extent, Moved};
 use crate::triangles::{Part, TRIANGLES_PER_PART, Triangle, WideTriangle};
+use bvh_format::vec3::subtract;
 use bytemuck::{Pod, Zeroable};
 use cells::{BYTES_PER_USE, Cells};
 use first::Reach;
@@ -43,8 +44,8 @@ pub(crate) struct Welded {
     pub(crate) extent: Extent,
     /// Whether all triangles are points.
     pub(crate) is_cloud: bool,
-    /// The greatest distance by which a vertex moved, as [`length`] computes it.
-    pub(crate) moved: f64,
+    /// How far vertices moved.
+    pub(crate) moved: Moved,
 }
 
 /// What is sorted: a vertex in the list of a cell, and later the move of a vertex. One type for both, so that the code that sorts exists
@@ -101,7 +102,12 @@ impl Unwelded {
         if is_welded {
             return weld(self.parts, &self.extent, self.is_cloud, distance, resources, spill);
         }
-        Ok(Welded { parts: self.parts, extent: self.extent, is_cloud: self.is_cloud, moved: 0.0 })
+        Ok(Welded {
+            parts: self.parts,
+            extent: self.extent,
+            is_cloud: self.is_cloud,
+            moved: Moved::default(),
+        })
     }
 }
 
@@ -155,11 +161,12 @@ pub(crate) fn weld(
     let most = resources.sorted_at_once::<[u8; BYTES_PER_USE]>(u64::MAX);
     cells.first_vertices(uses, &Reach::new(distance), most, spill, &mut moves)?;
     if moves.count() == 0 {
-        return Ok(Welded { parts, extent: *extent, is_cloud, moved: 0.0 });
+        return Ok(Welded { parts, extent: *extent, is_cloud, moved: Moved::default() });
     }
     let moves = moves.finish();
     let mut moves = Ahead::of(&moves)?;
-    let mut welded = Welded { parts: Vec::new(), extent: Extent::EMPTY, is_cloud: true, moved: 0.0 };
+    let mut welded =
+        Welded { parts: Vec::new(), extent: Extent::EMPTY, is_cloud: true, moved: Moved::default() };
     let (mut parts, mut number) = (parts.into_iter(), 0);
     loop {
         let mut numbered = Vec::new();
@@ -179,7 +186,7 @@ pub(crate) fn weld(
             welded.parts.append(&mut parts);
             welded.extent = welded.extent.joined(extent);
             welded.is_cloud &= is_cloud;
-            welded.moved = welded.moved.max(moved);
+            welded.moved = welded.moved.joined(moved);
         }
     }
 }
@@ -221,7 +228,8 @@ fn vertices(triangles: &[WideTriangle], number: u64) -> Vec<(Bits, u64)> {
 /// Returns a part with its vertices moved. `moves` are those of the part.
 fn moved_part(part: Part, moves: &[Record], spill: &Spill) -> Result<Welded, BakeError> {
     let all = wide(&part)?;
-    let mut welded = Welded { parts: Vec::new(), extent: Extent::EMPTY, is_cloud: true, moved: 0.0 };
+    let mut welded =
+        Welded { parts: Vec::new(), extent: Extent::EMPTY, is_cloud: true, moved: Moved::default() };
     // Vertices are multiples of the least unit before they are welded.
     let unmoved = &mut Moved::default();
     if moves.is_empty() {
@@ -238,7 +246,7 @@ fn moved_part(part: Part, moves: &[Record], spill: &Spill) -> Result<Welded, Bak
     for moved in moves {
         let place = (moved.corner % CORNERS_PER_PART) as usize;
         let (from, to) = (all[place / 3].corners[place % 3], moved.position.map(f64::from_bits));
-        welded.moved = welded.moved.max(length([0, 1, 2].map(|axis| from[axis] - to[axis])));
+        welded.moved.record_rounding(subtract(from, to));
         places.insert(bits(from), moved.position);
     }
     for triangle in &mut all {
@@ -251,14 +259,4 @@ fn moved_part(part: Part, moves: &[Record], spill: &Spill) -> Result<Welded, Bak
     }
     welded.parts.push(super::part(all, spill)?);
     Ok(welded)
-}
-
-/// Returns the length of a vector, scaled such that squares neither overflow nor vanish. It has at most five rounding errors of
-/// 2^-53.
-fn length(v: [f64; 3]) -> f64 {
-    let largest = v.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
-    if largest == 0.0 {
-        return 0.0;
-    }
-    largest * v.iter().map(|c| (c / largest).powi(2)).sum::<f64>().sqrt()
 }
