@@ -81,6 +81,7 @@ mod isa;
 mod leaf;
 mod motion;
 mod narrow;
+mod numerics;
 mod pose;
 mod query;
 mod scene;

@@ -21,12 +21,10 @@
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, repeat, tile, valid_lanes};
-use crate::leaf::math::{Corners, U, Vec3, cross, dot, edges, largest_of, max3, min3, project};
+use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest_of, max3, min3, project};
 use crate::leaf::placed_packet::{PlacedPacket, load4};
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
-
-/// A bound of all underflows of a projection together: 2^-120, in cubes of the frame's unit.
-const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
+use crate::numerics::{CUBE_UNDERFLOW, U};
 
 /// Stage two: the candidates of a queue, in the order of arrival, that no edge axis separates.
 #[inline(always)]
@@ -91,7 +89,7 @@ pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local<'_>, a: LeafPacket, b: L
 fn error<I: Isa>(isa: I, local: &Local<'_>, packet: &PlacedPacket) -> I::H {
     let edge = isa.load4(&packet.edge);
     let relative = edge.mul_add(isa.splat4(112.0 * U), isa.splat4(48.0 * local.error));
-    edge.mul(isa.splat4(local.reach)).mul_add(relative, isa.splat4(UNDERFLOW))
+    edge.mul(isa.splat4(local.reach)).mul_add(relative, isa.splat4(CUBE_UNDERFLOW))
 }
 
 /// Where three points are: all certainly on one side of a plane, or certainly on both.
@@ -112,7 +110,7 @@ fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, 
     let relative = edge.mul_add(isa.splat(112.0 * U), error.mul(isa.splat(48.0)));
     // Two projections are compared, each with its error.
     let both = edge.mul(reach).mul(isa.splat(2.0));
-    let error = both.mul_add(relative, isa.splat(2.0 * UNDERFLOW));
+    let error = both.mul_add(relative, isa.splat(2.0 * CUBE_UNDERFLOW));
     let below_error = isa.splat(0.0).sub(error);
     let mut sides = Sides { apart: 0, overlap: u16::MAX };
     for i in 0..3 {

@@ -14,9 +14,10 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::local::{Local, repeat, tile};
-use crate::leaf::math::{Corners, U, Vec3, add, along, dot, edges, max3, min3, project, splat4, sub};
+use crate::leaf::math::{Corners, Vec3, add, along, dot, edges, max3, min3, project, splat4, sub};
 use crate::leaf::placed_packet::load4;
 use crate::leaf::queue::TriangleQueue;
+use crate::numerics::U;
 
 /// Bounds on 16 distances, in units of the local frame.
 pub(crate) struct Bounds {

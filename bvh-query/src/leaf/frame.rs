@@ -3,11 +3,9 @@
 //! The unit makes the larger object about 1 in size, so that squares and products stay within f32's range whatever the
 //! mesh's unit.
 
+use crate::numerics::COORDINATE_UNDERFLOW;
 use crate::traverse::placement::Placement;
 use bvh_format::object::Object;
-
-/// The error that underflow adds to each coordinate: 2^-140, in units of the frame.
-const UNDERFLOW: f32 = f32::from_bits(1 << 9);
 
 /// The frame that all pairs of packets of a query share.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +30,7 @@ impl LocalFrame {
             translation: placement.translation,
             rotation32,
             scale: scale as f32,
-            error: ((placement.error * scale) as f32).next_up() + UNDERFLOW,
+            error: ((placement.error * scale) as f32).next_up() + COORDINATE_UNDERFLOW,
         }
     }
 }

@@ -11,12 +11,10 @@
 //! d^2 + 36u m^2, and less than (m + d) (18 d + 48u m).
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::math::{U, cross, dot, largest_of};
+use crate::leaf::math::{cross, dot, largest_of};
 use crate::leaf::point::LocalPoint;
+use crate::numerics::{SIGN_UNDERFLOW, U};
 use bvh_format::leaf::Packet;
-
-/// More than what the underflow of some 30 products adds to a sign, by 2^-150 each.
-const UNDERFLOW: f32 = f32::MIN_POSITIVE;
 
 /// Returns a direction with no component beyond 1.
 #[inline(always)]
@@ -39,7 +37,7 @@ pub(crate) fn crossed<I: Isa>(
     let m = largest_of(&[a, b, c]);
     let d = m.mul_add(isa.splat(2.0 * U), isa.splat(point.error));
     let relative = m.mul_add(isa.splat(48.0 * U), d.mul(isa.splat(18.0)));
-    let certain = m.add(d).mul_add(relative, isa.splat(UNDERFLOW));
+    let certain = m.add(d).mul_add(relative, isa.splat(SIGN_UNDERFLOW));
     let (ab, bc, ca) = (dot(w, cross(a, b)), dot(w, cross(b, c)), dot(w, cross(c, a)));
     let (least, most) = (ab.min(bc).min(ca), ab.max(bc).max(ca));
     let zero = isa.splat(0.0);

@@ -14,8 +14,9 @@
 
 use crate::isa::Isa;
 use crate::leaf::frame::LocalFrame;
-use crate::leaf::math::{Corners, U, Vec3, add, dot, splat4};
+use crate::leaf::math::{Corners, Vec3, add, dot, splat4};
 use crate::leaf::placed_packet::{PlacedPacket, larger};
+use crate::numerics::U;
 
 /// A packet of A and one of B in one frame, whose origin is the first corner of A's.
 pub(crate) struct Local<'a> {

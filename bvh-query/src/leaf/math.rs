@@ -5,9 +5,6 @@
 
 use crate::isa::{Isa, Lanes};
 
-/// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
-pub(crate) const U: f32 = 1.0 / (1 << 24) as f32;
-
 /// x, y, z of several lanes.
 pub(crate) type Vec3<T> = [T; 3];
 

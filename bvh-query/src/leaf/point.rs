@@ -14,11 +14,9 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::distance::{Bounds, Guess, certify, clamp, inverse_squares, points_on_face};
-use crate::leaf::math::{Corners, U, Vec3, along, dot, edges, largest_of, min3, project};
+use crate::leaf::math::{Corners, Vec3, along, dot, edges, largest_of, min3, project};
+use crate::numerics::{COORDINATE_UNDERFLOW, U};
 use bvh_format::leaf::Packet;
-
-/// The error that underflow adds to each coordinate: 2^-140, in units of the frame.
-const UNDERFLOW: f32 = f32::from_bits(1 << 9);
 
 /// A point in two parts.
 pub(crate) struct LocalPoint {
@@ -38,7 +36,7 @@ impl LocalPoint {
     pub(crate) fn new(point: &[f64; 3], error: f64, scale: f32) -> Self {
         let high = point.map(|x| x as f32);
         let minus_low = [0, 1, 2].map(|k| ((f64::from(high[k]) - point[k]) * f64::from(scale)) as f32);
-        let error = ((5.0 * error * f64::from(scale)) as f32 + UNDERFLOW) * (1.0 + 4.0 * U);
+        let error = ((5.0 * error * f64::from(scale)) as f32 + COORDINATE_UNDERFLOW) * (1.0 + 4.0 * U);
         Self { high, minus_low, scale, error }
     }
 

@@ -30,15 +30,13 @@
 use crate::isa::{Isa, Lanes};
 use crate::leaf::frame::scale_of;
 use crate::leaf::local::{repeat, tile};
-use crate::leaf::math::{Corners, U, Vec3, cross, dot, edges, largest, max3, min3, sub};
+use crate::leaf::math::{Corners, Vec3, cross, dot, edges, largest, max3, min3, sub};
 use crate::leaf::placed_packet::load4;
 use crate::narrow::Triangle;
+use crate::numerics::{CUBE_UNDERFLOW, U};
 use crate::traverse::packet_tree::{BEFORE, Boxes};
 use bvh_format::leaf::{PACKET, Packet};
 use bvh_format::object::Object;
-
-/// A bound of all underflows of a height together: 2^-120, in cubes of the unit.
-const UNDERFLOW: f32 = f32::from_bits((127 - 120) << 23);
 
 /// Four triangles, and what the tests need of them.
 #[derive(Clone, Copy)]
@@ -337,7 +335,7 @@ impl<V: Lanes> HeightError<V> {
     /// The distance is that of corners, and that of vertices may be larger.
     #[inline(always)]
     fn constant<I: Isa<V = V>>(isa: I, per_distance: V, own: V, left_out: f32) -> V {
-        per_distance.mul_add(isa.splat(2.0 * left_out), own.add(isa.splat(UNDERFLOW)))
+        per_distance.mul_add(isa.splat(2.0 * left_out), own.add(isa.splat(CUBE_UNDERFLOW)))
     }
 }
 

@@ -12,13 +12,9 @@
 
 use crate::motion::RigidPath;
 use crate::motion::linear::length;
-use crate::motion::relative::{MOST, ROUNDING, RelativePath};
+use crate::motion::relative::RelativePath;
+use crate::numerics::{COMPOSED_ERROR, FLUSHED, INVERSE_NORM, RELATIVE_ERROR};
 use crate::pose::Pose;
-
-/// 64u: four times what one composition is off by. A point is compared with a segment, of which both ends are off as well.
-const COMPOSED: f64 = 1.0 / (1u64 << 47) as f64;
-/// More than four translations that count as 0, 2^-210 mesh units.
-const FLUSHED: f64 = f64::from_bits((1023 - 210) << 52);
 
 /// The path of an instance: that of a body in the world, and the poses that are kept from there down to the instance.
 #[derive(Clone)]
@@ -41,7 +37,9 @@ impl<'a> AttachedPath<'a> {
     /// Returns how far points within `radius` of the origin are at most from the origin of the body.
     fn reach(&self, radius: f64) -> f64 {
         let kept = self.kept.iter().rev();
-        kept.fold(radius, |reach, kept| (MOST * reach + length(kept.translation())) * (1.0 + ROUNDING))
+        kept.fold(radius, |reach, kept| {
+            (INVERSE_NORM * reach + length(kept.translation())) * (1.0 + RELATIVE_ERROR)
+        })
     }
 
     /// Returns by how much the roundings of poses may bend the path of a point at this distance from the body's origin.
@@ -49,7 +47,7 @@ impl<'a> AttachedPath<'a> {
         let times = self.kept.len() as f64;
         let ends = [t0, t1].map(|t| length(self.body.pose(t).translation()));
         let away = ends[0].max(ends[1]) + valid(self.body.sagitta(0.0, t0, t1));
-        times * (COMPOSED * (away + reach) + FLUSHED)
+        times * (COMPOSED_ERROR * (away + reach) + FLUSHED)
     }
 }
 
@@ -63,7 +61,7 @@ impl RigidPath for AttachedPath<'_> {
             return self.body.sagitta(radius, t0, t1);
         }
         let reach = self.reach(radius);
-        (valid(self.body.sagitta(reach, t0, t1)) + self.rounding(reach, t0, t1)) * (1.0 + ROUNDING)
+        (valid(self.body.sagitta(reach, t0, t1)) + self.rounding(reach, t0, t1)) * (1.0 + RELATIVE_ERROR)
     }
 
     fn slides(&self, t0: f64, t1: f64) -> bool {
@@ -98,9 +96,9 @@ impl RigidPath for TogetherPath<'_> {
             return f64::INFINITY;
         }
         let of_b = self.b.reach(radius);
-        let between = MOST * (self.a.reach(0.0) + of_b);
+        let between = INVERSE_NORM * (self.a.reach(0.0) + of_b);
         let rounded = self.a.rounding(self.a.reach(between), t0, t1) + self.b.rounding(of_b, t0, t1);
-        (MOST * rounded + ROUNDING * between + FLUSHED) * (1.0 + ROUNDING)
+        (INVERSE_NORM * rounded + RELATIVE_ERROR * between + FLUSHED) * (1.0 + RELATIVE_ERROR)
     }
 }
 

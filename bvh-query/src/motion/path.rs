@@ -1,6 +1,7 @@
 //! Paths: where B is at each time, and how far its points are from straight lines in between; and the path at constant rates.
 
 use crate::motion::linear::{Matrix, difference, length, norm, transposed};
+use crate::numerics::{LINE_ERROR, MAX_STRETCH, POSE_ERROR, SLACK};
 use crate::pose::frames::{product, turn};
 use crate::pose::{Pose, PoseError};
 use bvh_format::object::MAX_COORDINATE;
@@ -53,12 +54,6 @@ impl<P: RigidPath + ?Sized> RigidPath for &P {
     }
 }
 
-/// How far a point of a computed pose may be from its ideal place, as a fraction of the magnitudes involved: 32
-/// roundings. That is twice the error of a sine and a cosine (one rounding each), Rodrigues' formula and a product of
-/// matrices.
-const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
-/// The same bound for a point on a line between two others: 2^-51, which is four roundings. Three occur.
-const LINE_ERROR: f64 = 1.0 / (1u64 << 51) as f64;
 /// The least cosine of half the angle between two poses for which it is certain which rotation is the shorter one.
 const MIN_HALF_COSINE: f64 = 1e-9;
 
@@ -257,7 +252,7 @@ impl Motion {
         let (from, to) = (self.start.translation(), self.end.translation());
         let line = length([0, 1, 2].map(|k| to[k] - from[k]));
         let defects = norm(&difference(&self.defects[1], &self.defects[0]));
-        (line + (self.angle.abs() + defects) * radius) * (1.0 + 1.0 / (1 << 17) as f64)
+        (line + (self.angle.abs() + defects) * radius) * MAX_STRETCH
     }
 
     /// Returns how far a point within `radius` of B's origin is at most from the axis about which it turns.
@@ -294,7 +289,7 @@ impl RigidPath for Motion {
             let turned = (t1 - t0) * self.angle;
             let arc = self.arm(radius) * (turned * turned) / 8.0;
             // Thrice: of the point, and of both ends of the segment.
-            arc * (1.0 + 1.0 / (1 << 17) as f64) + 3.0 * self.rounding(radius)
+            arc * MAX_STRETCH + 3.0 * self.rounding(radius)
         })
     }
 
@@ -326,7 +321,7 @@ pub(super) fn sagitta_of(
     let (start, end) = (path.pose(from), path.pose(to));
     let turned = norm(&difference(end.rotation(), start.rotation()));
     let moved = length([0, 1, 2].map(|k| end.translation()[k] - start.translation()[k])) + turned * radius;
-    inside + moved * (outside / (t1 - t0)).min(1.0) * (1.0 + 1.0 / (1u64 << 40) as f64)
+    inside + moved * (outside / (t1 - t0)).min(1.0) * (1.0 + SLACK)
 }
 
 /// Returns the rotation by an angle about an axis of length 1 (Rodrigues' formula).

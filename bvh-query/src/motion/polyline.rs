@@ -1,6 +1,7 @@
 //! The path through several poses.
 
 use crate::motion::path::{Motion, PathError, RigidPath, sagitta_of};
+use crate::numerics::SLACK;
 use crate::pose::Pose;
 
 /// A path through several poses. The motion from each pose to the next takes the same share of the time.
@@ -70,7 +71,7 @@ impl Polyline {
         let ends = [self.pose(t0), self.pose(t1)];
         let knot = |number: usize| self.bend(number, radius, [t0, t1], &ends);
         let knots = (first + 1..=last).map(knot).fold(0.0, f64::max);
-        bent + knots * (1.0 + 1.0 / (1u64 << 40) as f64)
+        bent + knots * (1.0 + SLACK)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::motion::RigidPath;
 use crate::motion::linear::{difference, length, norm};
+use crate::numerics::{INVERSE_NORM, RELATIVE_ERROR};
 use crate::pose::Pose;
 use bvh_format::object::MAX_COORDINATE;
 
@@ -40,11 +41,6 @@ impl RigidPath for Pose {
     }
 }
 
-/// More than the norm of the inverse of any pose's rotation.
-pub(super) const MOST: f64 = 1.0 + 1.0 / (1 << 18) as f64;
-/// More than the relative error of all arithmetic here.
-pub(super) const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
-
 /// Let M be the inverse of A's rotation R, w the way from A's origin to a point of B, in the world, and q = M w where the
 /// point is in A's frame. An index "lin" stands for what is linear in time between both ends, which are indexed 0 and 1; D
 /// for a difference of the ends.
@@ -79,16 +75,16 @@ impl RigidPath for RelativePath<'_> {
             + norm(&difference(b1.rotation(), b0.rotation())) * radius;
         let still_a = of(self.a, 0.0);
         let bent = of(self.b, radius) + still_a;
-        let farthest = length(way_0).max(length(way_1)) + MOST * radius + bent;
-        let x = turned * turned * MOST * MOST / 4.0;
+        let farthest = length(way_0).max(length(way_1)) + INVERSE_NORM * radius + bent;
+        let x = turned * turned * INVERSE_NORM * INVERSE_NORM / 4.0;
         let turning = if x < 0.5 {
             let rest = 1.0 / (1.0 - x);
-            MOST * (x * farthest * rest + of(self.a, MOST * farthest * rest) + still_a)
+            INVERSE_NORM * (x * farthest * rest + of(self.a, INVERSE_NORM * farthest * rest) + still_a)
         } else {
-            2.0 * MOST * farthest
+            2.0 * INVERSE_NORM * farthest
         };
-        let crossed = MOST * MOST * turned * moved / 4.0;
-        (turning + MOST * bent + crossed) * (1.0 + ROUNDING) + ROUNDING * farthest
+        let crossed = INVERSE_NORM * INVERSE_NORM * turned * moved / 4.0;
+        (turning + INVERSE_NORM * bent + crossed) * (1.0 + RELATIVE_ERROR) + RELATIVE_ERROR * farthest
     }
 
     /// B slides along A's axes if it does along the world's, A stands still, and A's axes are the world's.
@@ -145,7 +141,7 @@ mod tests {
             let own = path.sagitta(1.0, 0.25, 0.5);
             let way =
                 [0.25, 0.5].map(|t| length(between(&still, &path.pose(t)))).into_iter().fold(2.0, f64::max);
-            assert!((of(&still, &*path) - own).abs() <= 1e-5 * own + 2.0 * ROUNDING * way);
+            assert!((of(&still, &*path) - own).abs() <= 1e-5 * own + 2.0 * RELATIVE_ERROR * way);
         }
     }
 }

@@ -27,12 +27,12 @@
 
 use super::candidates::{Differences, Feet, Foot, Vectors, dot as dot_at_corners, everywhere, point};
 use super::{
-    Point, Triangle, UNIT_ROUNDOFF, add_scaled, cross, dot, largest_of, negated, reciprocal_exponent,
-    triangles_intersect,
+    Point, Triangle, add_scaled, cross, dot, largest_of, negated, reciprocal_exponent, triangles_intersect,
 };
 use crate::isa::Isa;
 use crate::isa::corners::{Corners, Three};
 use crate::isa::scalar::Scalar;
+use crate::numerics::UNIT_ROUNDOFF;
 
 /// How far two triangles are apart, and where; lengths in mesh units.
 #[derive(Clone, Copy, Debug, PartialEq)]

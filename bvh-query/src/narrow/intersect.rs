@@ -14,7 +14,8 @@ use std::cmp::Ordering;
 
 use robust::{Coord, Coord3D};
 
-use super::{Point, Triangle, UNIT_ROUNDOFF, cross, dot, subtract};
+use super::{Point, Triangle, cross, dot, subtract};
+use crate::numerics::ORIENTATION_ERROR;
 
 /// Returns whether two closed triangles share at least one point.
 ///
@@ -147,10 +148,8 @@ impl Plane {
     /// Returns the height of a point, times twice the triangle's area, and a bound of its error.
     #[inline(always)]
     pub(super) fn height(&self, point: Point) -> (f64, f64) {
-        /// The bound of the filter's error, as a fraction of the permanent.
-        const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
         let w = subtract(point, self.corner);
-        (dot(w, self.normal), BOUND * dot(w.map(f64::abs), self.magnitude))
+        (dot(w, self.normal), ORIENTATION_ERROR * dot(w.map(f64::abs), self.magnitude))
     }
 }
 

@@ -52,9 +52,6 @@ pub(crate) type Point = [f64; 3];
 /// The closed triangle with three corners; three collinear corners make a segment, three equal ones a point.
 pub(crate) type Triangle = [Point; 3];
 
-/// Half a unit in the last place of 1: the largest relative error of one rounding to nearest.
-pub(crate) const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
-
 /// Returns `p + factor * q`; each coordinate is rounded twice.
 #[inline(always)]
 fn add_scaled(p: Point, factor: f64, q: Point) -> Point {

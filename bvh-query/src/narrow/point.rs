@@ -8,12 +8,10 @@
 use super::candidates::{self as vectors, Foot, Vectors, everywhere};
 use super::distance::{Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, perpendicular_part};
 use super::intersect::triangle_contains;
-use super::{
-    Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot, largest_of, negated, reciprocal_exponent,
-    triangle_distance,
-};
+use super::{Point, Triangle, add_scaled, dot, largest_of, negated, reciprocal_exponent, triangle_distance};
 use crate::isa::Isa;
 use crate::isa::corners::Corners;
+use crate::numerics::UNIT_ROUNDOFF;
 
 /// Returns the distance of a point from a closed triangle, with bounds and the closest point.
 ///

@@ -21,7 +21,8 @@
 use super::integers::{
     Vector, cross as cross_exactly, dot as dot_exactly, exponent, integer, minus, quotient,
 };
-use super::{Point, Triangle, UNIT_ROUNDOFF, cross, dot, subtract};
+use super::{Point, Triangle, cross, dot, subtract};
+use crate::numerics::{ORIENTATION_ERROR, UNIT_ROUNDOFF};
 use num_bigint::{BigInt, Sign};
 use std::cmp::Ordering;
 
@@ -70,9 +71,6 @@ impl Feature {
     }
 }
 
-/// The bound of the filter's error, as a fraction of the permanent: see `intersect`.
-const BOUND: f64 = (7.0 + 56.0 * UNIT_ROUNDOFF) * UNIT_ROUNDOFF;
-
 /// How much of a parameter may be in doubt: 2^-44 of it.
 const DOUBT: f64 = 1.0 / (1u64 << 44) as f64;
 
@@ -104,7 +102,7 @@ impl Ray {
     fn side(&self, triangle: &Triangle, seen: &Triangle, i: usize) -> f64 {
         let (u, v) = (seen[i], seen[(i + 1) % 3]);
         let side = dot(self.direction, cross(u, v));
-        if side.abs() > BOUND * permanent(self.direction, u, v) {
+        if side.abs() > ORIENTATION_ERROR * permanent(self.direction, u, v) {
             side
         } else {
             self.exact_side(triangle[i], triangle[(i + 1) % 3])
@@ -139,8 +137,8 @@ impl Ray {
         let normal = cross(u, v);
         let sign = if forwards { 1.0 } else { -1.0 };
         let (height, slope) = (sign * dot(seen[0], normal), sign * dot(self.direction, normal));
-        let height_error = BOUND * permanent(seen[0], u, v);
-        let slope_error = BOUND * permanent(self.direction, u, v);
+        let height_error = ORIENTATION_ERROR * permanent(seen[0], u, v);
+        let slope_error = ORIENTATION_ERROR * permanent(self.direction, u, v);
         if height < -height_error {
             return None;
         }

@@ -20,7 +20,8 @@ use super::distance::{longest, perpendicular_normal, times};
 use super::integers::{cross as cross_exactly, dot as dot_exactly, exponent, integer, minus, quotient};
 use super::intersect::{Aligned, Hull, Plane, are_collinear, area, area_axis, heights, lexicographic};
 use super::intersect::{triangle_contains, volume};
-use super::{Point, Triangle, UNIT_ROUNDOFF, dot, negated, reciprocal_exponent, subtract};
+use super::{Point, Triangle, dot, negated, reciprocal_exponent, subtract};
+use crate::numerics::UNIT_ROUNDOFF;
 use num_bigint::BigInt;
 use std::cmp::Ordering;
 

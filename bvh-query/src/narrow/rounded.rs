@@ -9,10 +9,11 @@
 
 use super::within::ray_within;
 use super::{
-    Closest, Crossing, Point, Ray, Triangle, UNIT_ROUNDOFF, dot, point_distance, subtract, triangle_distance,
+    Closest, Crossing, Point, Ray, Triangle, dot, point_distance, subtract, triangle_distance,
     triangles_within,
 };
 use crate::isa::scalar::Scalar;
+use crate::numerics::UNIT_ROUNDOFF;
 
 /// How often an interval of the parameter is halved: more often than an f64 has digits.
 const HALVINGS: u32 = 64;

@@ -10,7 +10,8 @@
 //! projections are charged. Whether triangles certainly cross depends on the axes being those of the body, so the roundings of
 //! an axis are charged as well. The specification derives both (`spec/numerics.md`, "How deep").
 
-use super::{Point, Triangle, UNIT_ROUNDOFF as U, cross, dot, subtract};
+use super::{Point, Triangle, cross, dot, subtract};
+use crate::numerics::UNIT_ROUNDOFF as U;
 
 /// The stretch of a way during which two triangles are in contact, in units of the direction.
 #[derive(Clone, Copy, Debug)]

@@ -8,6 +8,7 @@ mod from_mint;
 
 pub use error::PoseError;
 
+use crate::numerics::LEAST_COORDINATE;
 use bvh_format::instances::{departure, handedness};
 use bvh_format::vec3::dot;
 
@@ -35,9 +36,6 @@ const MIN_SCALED_ERROR: f64 = 1.0 / 1024.0;
 const MAX_TRANSLATION: f64 = bvh_format::object::MAX_COORDINATE;
 /// Rotation entries below this, 2^-64, count as 0: see `Pose`.
 const MIN_ROTATION_ENTRY: f64 = 1.0 / (1u128 << 64) as f64;
-/// Translations below this, 2^-213 mesh units, count as 0: see `Pose`.
-const MIN_TRANSLATION: f64 = f64::from_bits((1023 - 213) << 52);
-
 impl Pose {
     /// The identity: B's frame is A's.
     pub const IDENTITY: Self =
@@ -86,7 +84,7 @@ impl Pose {
         let flush = |tiny: f64| move |v: f64| if v.abs() < tiny { 0.0 } else { v };
         Self {
             rotation: rotation.map(|row| row.map(flush(MIN_ROTATION_ENTRY))),
-            translation: translation.map(flush(MIN_TRANSLATION)),
+            translation: translation.map(flush(LEAST_COORDINATE)),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Compares the bounding spheres and boxes of two objects, which decides most queries of separated meshes.
 
+use crate::numerics::SLACK;
 use crate::traverse::placement::{ObjectPair, Placement};
 use crate::traverse::stages::Stage;
 use bvh_format::object::Object;
@@ -12,7 +13,7 @@ pub(super) fn sphere_gap(placement: &Placement, a: &Object, b: &Object) -> f64 {
     let squared: f64 = between.iter().map(|d| d * d).sum();
     let radii = a.sphere_radius + b.sphere_radius;
     // A pose may stretch by 2^-20 and the f64 error of a placed point is charged to the radii too.
-    let gap = squared.sqrt() * (1.0 - 2f64.powi(-40));
+    let gap = squared.sqrt() * (1.0 - SLACK);
     gap - radii * (1.0 + 2f64.powi(-19)) - 3.0 * placement.error
 }
 
@@ -59,7 +60,7 @@ fn apart_along_sides(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::traverse::placement::POSE_ERROR;
+    use crate::numerics::POSE_ERROR;
     use cbvh_testkit::Random;
 
     /// Boxes that share a point are not apart, even by a rotation as far off as a pose may have; and most that have

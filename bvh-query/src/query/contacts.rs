@@ -3,6 +3,7 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
+use crate::numerics::round_up;
 use crate::pose::Pose;
 use crate::query::answers::{Contact, QueryStats};
 use crate::query::bounding_volumes::{sphere_gap, surely_apart};
@@ -12,7 +13,6 @@ use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
 use crate::query::search::{EachWithin, Finalists, Nearest, Search, ids};
-use crate::traverse::align::round_up;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;

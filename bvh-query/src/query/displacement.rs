@@ -1,8 +1,8 @@
 //! Bounds how far the vertices of an object move from one pose to another.
 
 use crate::file::shape::Shape;
+use crate::numerics::POSE_ERROR;
 use crate::pose::Pose;
-use crate::traverse::placement::POSE_ERROR;
 use bvh_format::object::Object;
 
 /// Returns the largest side of the boxes of objects, in mesh units.

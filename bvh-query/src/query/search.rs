@@ -13,11 +13,11 @@ use crate::leaf::local::valid_lanes;
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::{Closest, triangles_intersect, triangles_within};
+use crate::numerics::{SLACK, round_up};
 use crate::query::answers::{Distance, QueryStats};
 use crate::query::exact::TriangleDistance;
 use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{Found, PlacedPair, Visit};
-use crate::traverse::align::round_up;
 use crate::traverse::node_filter::Measure;
 use crate::traverse::stages::Stage;
 use crate::traverse::walk::{Order, Visitor};
@@ -109,7 +109,7 @@ impl Search {
             direction: None,
             order: Order::Best { leaves: BEST_FIRST_LEAF_PAIRS },
         };
-        search.lower_upper(round_up(enough * (1.0 + 2f64.powi(-40))));
+        search.lower_upper(round_up(enough * (1.0 + SLACK)));
         search
     }
 
@@ -212,7 +212,7 @@ impl Search {
 /// Returns the limit that a pair of triangles sets, with slack for the error of the f64 distance itself, so that pairs as
 /// near or nearly as near are kept.
 fn with_slack(upper: f64) -> f32 {
-    round_up(upper * (1.0 + 2f64.powi(-40)))
+    round_up(upper * (1.0 + SLACK))
 }
 
 /// Scales a direction to a length of at most 1. A direction of no length gives none.

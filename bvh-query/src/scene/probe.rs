@@ -6,6 +6,7 @@
 
 use crate::error::QueryError;
 use crate::narrow::Point;
+use crate::numerics::PROBE_ERROR;
 use crate::query::answers::{ClosestPoint, QueryStats, RayHit, Side, SignedDistance};
 use crate::query::probe::closest::check_within;
 use crate::query::probe::line::{Line, LineQuestion, range_in_box};
@@ -38,9 +39,6 @@ pub struct SceneRayHit {
     /// The hit, in the world.
     pub hit: RayHit,
 }
-
-/// The share of the magnitudes at hand that the box of an instance is enlarged by when a line is clipped to it.
-const ERROR: f64 = 1.0 / (1u64 << 45) as f64;
 
 impl Scene {
     /// Returns the closest point of all instances to each of many points in the world, or `None` for a point from which
@@ -217,7 +215,7 @@ impl Asked<'_> {
         let entry = |bounds: &WorldBox| {
             let magnitude =
                 sum_of_magnitudes(&origin) + sum_of_magnitudes(&bounds.lo) + sum_of_magnitudes(&bounds.hi);
-            match range_in_box(&origin, &direction, &[bounds.lo, bounds.hi], ERROR * magnitude) {
+            match range_in_box(&origin, &direction, &[bounds.lo, bounds.hi], PROBE_ERROR * magnitude) {
                 Some([near, far]) if far >= 0.0 && near <= until => near.max(0.0),
                 _ => f64::INFINITY,
             }

@@ -10,14 +10,9 @@
 //! against the world by 2^-22, so that squared gaps between boxes are reduced by 2^-19 of themselves: see `squared_gap`. A
 //! relative translation below 2^-213 counts as 0, for which each box is larger by 2^-211.
 
+use crate::numerics::{FLUSHED, SLACK};
 use crate::pose::Pose;
 use bvh_format::object::{Object, Volumes};
-
-/// The share of the magnitudes by which a box is enlarged.
-const ERROR: f64 = 1.0 / (1u64 << 40) as f64;
-
-/// More than a relative translation that counts as 0, 2^-211 mesh units.
-const FLUSHED: f64 = f64::from_bits((1023 - 211) << 52);
 
 /// A box along the axes of the world, in mesh units.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -36,7 +31,7 @@ impl WorldBox {
         let shift = translation.iter().map(|t| t.abs()).sum::<f64>();
         let mut bounds = Self::EMPTY;
         for Extent { centre, half, middle, radius, magnitude } in objects {
-            let error = ERROR * (magnitude + shift) + FLUSHED;
+            let error = SLACK * (magnitude + shift) + FLUSHED;
             for k in 0..3 {
                 let r = &rotation[k];
                 let at = |p: &[f64; 3]| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + translation[k];
@@ -65,7 +60,7 @@ impl WorldBox {
     /// Returns a box that is larger by some mesh units on every side.
     pub(super) fn grown(&self, by: f64) -> Self {
         // More than all roundings.
-        let by = |end: f64| by * (1.0 + 1.0 / (1u64 << 40) as f64) + ERROR * end.abs();
+        let by = |end: f64| by * (1.0 + SLACK) + SLACK * end.abs();
         Self { lo: self.lo.map(|end| end - by(end)), hi: self.hi.map(|end| end + by(end)) }
     }
 

@@ -12,15 +12,11 @@
 //! nothing for it.
 
 use crate::isa::{Isa, Lanes, Part, Task};
+use crate::numerics::{END_UNDERFLOW, U};
 use crate::traverse::placement::Placement;
 use bvh_format::kdop::{DirectionSet, FACTORS};
 use bvh_format::realign::{cone, magnitudes, rows_by_cone};
 use bvh_format::slabs::{Group, row};
-
-/// The unit roundoff of `f32`: the largest relative error of one rounding to nearest.
-pub(crate) const U: f64 = 1.0 / (1u64 << 24) as f64;
-/// The error that underflow adds to an end, in mesh units: 2^-147, twice what four roundings of subnormal numbers give.
-const UNDERFLOW: f64 = f64::from_bits((1023 - 147) << 52);
 
 /// All directions of A for one pose: the three terms of B's upper ends along them, and what to add. The lower end
 /// has the same coefficients over the other ends of the slabs.
@@ -231,21 +227,15 @@ impl Task for Prepare<'_> {
 #[inline(always)]
 pub(crate) fn form_error([x, y, z]: [f32; 3], reach: f32, offset: f64) -> f64 {
     let terms = f64::from(reach) * f64::from(x.abs() + y.abs() + z.abs());
-    10.0 * U * (terms + offset.abs()) + UNDERFLOW
-}
-
-/// Returns the least f32 that is not below `value`.
-pub(crate) fn round_up(value: f64) -> f32 {
-    let nearest = value as f32;
-    if f64::from(nearest) < value { nearest.next_up() } else { nearest }
+    10.0 * f64::from(U) * (terms + offset.abs()) + END_UNDERFLOW
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::isa::Backend;
+    use crate::numerics::POSE_ERROR;
     use crate::pose::Pose;
-    use crate::traverse::placement::POSE_ERROR;
     use bvh_format::kdop::Kdop;
     use bvh_format::slabs::NodeSlabs;
     use bvh_format::treelet::child_slabs;

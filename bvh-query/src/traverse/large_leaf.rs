@@ -13,6 +13,7 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
+use crate::numerics::SLACK;
 use crate::traverse::align::form_error;
 use crate::traverse::cached_node::{CachedNode, ChildRef};
 use crate::traverse::node_cache::NodeCache;
@@ -200,7 +201,7 @@ fn direction(triangle: &[Point; 3], point: Point) -> Option<Point> {
     let closest = closest_point(triangle, point);
     let d = [0, 1, 2].map(|axis| point[axis] - closest[axis]);
     let length = dot(d, d).sqrt();
-    let unit = d.map(|x| x / length * (1.0 - 2f64.powi(-40)));
+    let unit = d.map(|x| x / length * (1.0 - SLACK));
     unit.iter().all(|x| x.is_finite()).then_some(unit)
 }
 

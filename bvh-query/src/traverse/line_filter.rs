@@ -16,7 +16,8 @@
 //! slab, both ends are then at least w - w / 2 away, and the quotients are beyond 0 and 1.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{FACTORS_BY_AXIS, U};
+use crate::numerics::U;
+use crate::traverse::align::FACTORS_BY_AXIS;
 use crate::traverse::point_filter::{in_all_columns, quads, rows_without_slab};
 use bvh_format::kdop::DirectionSet;
 use bvh_format::slabs::Group;
@@ -52,7 +53,7 @@ impl LineFilter {
         for row in 0..16 {
             let p = x[row] * start[0] + y[row] * start[1] + z[row] * start[2];
             let q = x[row] * vector[0] + y[row] * vector[1] + z[row] * vector[2];
-            let outward = 3.0 * U * (p.abs() + q.abs()) + least;
+            let outward = 3.0 * f64::from(U) * (p.abs() + q.abs()) + least;
             let is_along = q.abs() < 0.5 * outward;
             let q_or_least = if is_along { 0.5 * outward } else { q };
             let outward = if is_along { outward + q.abs() } else { outward };

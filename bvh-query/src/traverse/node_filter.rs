@@ -1,6 +1,7 @@
 //! The node filter: bounds 16 pairs of nodes at a time along A's directions and, later in a walk, along B's.
 
 use crate::isa::{Isa, Lanes};
+use crate::numerics::F32_SLACK;
 use crate::traverse::align::{Alignment, Prepare, form_error};
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::kdop::{DirectionSet, FACTORS};
@@ -65,7 +66,7 @@ impl Ways {
         let mut ways = Self::default();
         for (slab, [x, y, z]) in FACTORS.into_iter().enumerate() {
             let rate = direction[0] * x + direction[1] * y + direction[2] * z;
-            let way = ((1.0 + 1.0 / (1 << 20) as f64) / rate.abs()) as f32;
+            let way = ((1.0 + f64::from(F32_SLACK)) / rate.abs()) as f32;
             if rate > Self::LEAST_RATE {
                 ways.up[slab] = way;
             } else if rate < -Self::LEAST_RATE {
@@ -400,5 +401,5 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Gr
     let normal = isa.splat(f32::MIN_POSITIVE).le(sum);
     let apart = I::V::select(normal, sum.sqrt(), largest);
     let apart = I::V::select(sum.le(isa.splat(f32::MAX)), apart, largest);
-    largest.max(apart).mul(isa.splat(1.0 - 1.0 / (1 << 20) as f32))
+    largest.max(apart).mul(isa.splat(1.0 - F32_SLACK))
 }

@@ -1,12 +1,10 @@
 //! Where object B is in the frame of object A.
 
 use crate::file::bvh::Bvh;
+use crate::numerics::POSE_ERROR;
 use crate::pose::Pose;
 use crate::pose::frames::inverse;
 use bvh_format::object::Object;
-
-/// The relative error of all computations of a pose in `f64`: 32 roundings, three times the most that occur.
-pub(crate) const POSE_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// The pose of object B in the frame of object A, both around their origins.
 #[derive(Clone, Copy, Debug)]

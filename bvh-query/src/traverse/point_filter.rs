@@ -12,6 +12,7 @@
 //! what becomes of squares that underflow.
 
 use crate::isa::{Isa, Lanes};
+use crate::numerics::{F32_SLACK, SUBNORMAL_LOSS};
 use crate::traverse::align::FACTORS_BY_AXIS;
 use crate::traverse::node_filter::INVERSE_LENGTHS;
 use bvh_format::kdop::DirectionSet;
@@ -25,9 +26,6 @@ pub(crate) struct PointFilter {
     set: DirectionSet,
 }
 
-/// More than `f32` loses of a subnormal number, 2^-148.
-const UNDERFLOW: f64 = f64::from_bits((1023 - 148) << 52);
-
 impl PointFilter {
     /// Prepares the test of a point around the object's origin; `error` bounds that of its coordinates added up. `scale` is
     /// the inverse of the unit, a power of two.
@@ -38,7 +36,7 @@ impl PointFilter {
         for row in 0..16 {
             let along = x[row] * point[0] + y[row] * point[1] + z[row] * point[2];
             // Rounding to `f32` moves an end by half as much or less.
-            let outward = 2.0 * error + along.abs() * f64::from(f32::EPSILON) + UNDERFLOW;
+            let outward = 2.0 * error + along.abs() * f64::from(f32::EPSILON) + SUBNORMAL_LOSS;
             lo[row] = (along - outward) as f32;
             hi[row] = (along + outward) as f32;
             inverse_lengths[row] = INVERSE_LENGTHS[row] * scale;
@@ -87,7 +85,7 @@ impl PointFilter {
         let sum = x.add(y).add(z);
         let normal = isa.splat4(f32::MIN_POSITIVE).le(sum);
         let apart = I::H::select(normal, sum.sqrt(), largest);
-        largest.max(apart).mul(isa.splat4(1.0 - 1.0 / (1 << 20) as f32))
+        largest.max(apart).mul(isa.splat4(1.0 - F32_SLACK))
     }
 
     /// The gaps of four children along four slabs.

@@ -16,7 +16,7 @@
 //! 1, where |t| is the sum of its coordinates' magnitudes. `prepare` computes this once per query.
 
 use crate::isa::{Isa, Lanes};
-use crate::traverse::align::{U, round_up};
+use crate::numerics::{F32_SLACK, GAP_UNDERFLOW, U, round_up};
 use crate::traverse::node_filter::Measure;
 use crate::traverse::placement::Placement;
 use bvh_format::quantize::STEP_U8;
@@ -145,7 +145,9 @@ impl SlabFilter {
         }
         let t = placement.translation.iter().map(|x| x.abs()).sum::<f64>();
         let (a, b) = (f64::from(magnitudes.0), f64::from(magnitudes.1));
-        self.slack = round_up(U * (64.0 * a + 112.0 * b + 16.0 * t) + 6.0 * placement.error + UNDERFLOW);
+        self.slack = round_up(
+            f64::from(U) * (64.0 * a + 112.0 * b + 16.0 * t) + 6.0 * placement.error + GAP_UNDERFLOW,
+        );
         self.least_square = if a + b + t < MAX_MAGNITUDES { LEAST_SQUARE } else { f32::INFINITY };
     }
 
@@ -171,7 +173,7 @@ impl SlabFilter {
         let (width_a, width_b) = (isa.repeat(a.half.row(3)), isa.tile(b.half.row(3)));
         let c_a = repeat(isa, &a.centre);
         let to_b = [c_b[0].sub(c_a[0]), c_b[1].sub(c_a[1]), c_b[2].sub(c_a[2])];
-        let (slack, outward) = (isa.splat(self.slack), isa.splat(1.0 + 1.0 / (1 << 20) as f32));
+        let (slack, outward) = (isa.splat(self.slack), isa.splat(1.0 + F32_SLACK));
         // Along A's direction, then along B's.
         let cosine = dot::<I>(u_a, u_b_in_a);
         let share = cosine.abs();
@@ -207,9 +209,6 @@ impl SlabFilter {
     }
 }
 
-/// More than underflow adds to a gap, in mesh units, 2^-110: 60 products lose 2^-150 each, and along the line between
-/// centres that is divided by their distance.
-const UNDERFLOW: f64 = f64::from_bits((1023 - 110) << 52);
 /// The least square of a distance between centres that is used, 2^-60.
 const LEAST_SQUARE: f32 = f32::from_bits((127 - 60) << 23);
 /// The largest sum of the magnitudes of coordinates of A, of B and of the translation for which the line between

@@ -3,7 +3,8 @@
 
 use super::generate::{KINDS, float, grid_triangle, pair, shuffled, small, triangle};
 use crate::narrow::region::{Region, common_region, unit_normal};
-use crate::narrow::{Point, Triangle, UNIT_ROUNDOFF, add_scaled, dot};
+use crate::narrow::{Point, Triangle, add_scaled, dot};
+use crate::numerics::UNIT_ROUNDOFF;
 use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::exact::{self, Dyadic, Number, is_zero, subtract};

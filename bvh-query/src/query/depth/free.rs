@@ -15,7 +15,8 @@
 //! free because exact arithmetic says so of the pose there, and of nothing else.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, Triangle, UNIT_ROUNDOFF, dot, subtract, triangle_distance};
+use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
+use crate::numerics::UNIT_ROUNDOFF;
 use crate::query::answers::{Distance, Relation};
 use crate::query::depth::leaving::Leaving;
 use crate::query::depth::line::Line;

@@ -2,10 +2,10 @@
 
 use crate::file::shape::Shape;
 use crate::narrow::Point;
+use crate::numerics::{PLACING_ERROR, POSE_ERROR};
 use crate::pose::Pose;
 use crate::query::motion::radius;
 use crate::query::rounded::sum_of_radii;
-use crate::traverse::placement::POSE_ERROR;
 
 /// Two shapes, and the line that B moves on.
 #[derive(Clone, Copy)]
@@ -28,11 +28,6 @@ pub(super) struct Line<'a> {
     /// The size of the smaller triangles, about.
     pub(super) grain: f64,
 }
-
-/// With u for 2^-53, both places of a coordinate take 3 u of how far the corner is from B's origin, u of the sum with the
-/// translation, u of the translation, and 2 u of the way in it, which is a product with a sum. That is at most 8 u of the distance, the
-/// first translation and the length of the way, which has a percent to spare.
-const PLACING_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
 impl<'a> Line<'a> {
     pub(super) fn new(a: Shape<'a>, b: Shape<'a>, pose: &'a Pose) -> Self {

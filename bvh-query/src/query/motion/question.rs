@@ -4,6 +4,7 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::motion::RigidPath;
+use crate::numerics::{CELL_ERROR, SLACK};
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::MotionOptions;
@@ -18,16 +19,6 @@ const DEFAULT_TOLERANCE: f64 = 1e-6;
 /// be reached before B moves by less than the rounding of its poses, which is below 2^-42 of these distances where the meshes
 /// are near each other. A cell may reach an eighth of the tolerance.
 const LEAST_TOLERANCE: f64 = 1.0 / (1u64 << 38) as f64;
-/// More than the error of all `f64` arithmetic on coordinates here, as a fraction of the sum of distances in
-/// [`Question::limit`]: 2^-49, or 16 u with u for 2^-53. Placing a corner of B takes 7 u of its distance from B's origin and 4 u of the
-/// translation; products with a direction of unit length take 3 u of how far corners are from A's origin, and their difference 2 u.
-/// That is 12 u of both radii and 9 u of a translation; the sum has both radii thrice, and two translations. A relative error of
-/// 6 u is that of the limit itself.
-const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
-
-/// More than the relative error of dividing a way into cells.
-const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
-
 /// Two shapes, the path of B in A's frame, and what counts as a hit.
 pub(super) struct Question<'a> {
     pub(super) a: Shape<'a>,
@@ -113,7 +104,7 @@ impl<'a> Question<'a> {
         let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
         let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
         let least = self.clearance + reach + self.sagitta(t0, t1);
-        least * (1.0 + ROUNDING) + ROUNDING * magnitude
+        least * (1.0 + CELL_ERROR) + CELL_ERROR * magnitude
     }
 
     /// Returns how far any cell of an interval reaches at most. Cells have a reach of at most an eighth of the tolerance, and may have

@@ -2,16 +2,13 @@
 
 use crate::error::QueryError;
 use crate::narrow::{dot, subtract};
+use crate::numerics::HEIGHT_ERROR;
 use crate::query::regions::ContactRegion;
 use crate::traverse::budget::Budget;
 use std::ops::Range;
 
 /// A direction, shorter than 1, along which points are sorted. Few meshes have many points at one height along it.
 const DIRECTION: [f64; 3] = [0.531, 0.323, 0.762];
-
-/// A height along `DIRECTION` is off by at most three roundings of each term and one of the difference, and so is a limit: by
-/// less than 2^-50 of the sum of the magnitudes of the coordinates.
-const HEIGHT_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
 /// The comparisons of points that count as a visit.
 const COMPARISONS_PER_VISIT: u64 = 64;

@@ -1,6 +1,7 @@
 //! The centre, the normal, the length and the area of a patch. All sums are in the order of contacts.
 
-use crate::narrow::{MAX_POINTS, UNIT_ROUNDOFF, cross, dot, subtract, unit};
+use crate::narrow::{MAX_POINTS, cross, dot, subtract, unit};
+use crate::numerics::{NORMAL_ERROR, UNIT_ROUNDOFF};
 use crate::query::patches::join::Vertices;
 use crate::query::regions::{ContactRegion, RegionKind};
 use bvh_format::vec3::length;
@@ -28,9 +29,6 @@ struct Segment {
 
 /// How many times its error an area vector has to be long to tell a direction: it is then off by 2^-10 at most.
 const CLEAR: f64 = 1024.0;
-
-/// By how much a mean of unit normals of well-shaped triangles is off.
-const NORMAL_ERROR: f64 = 32.0 * UNIT_ROUNDOFF;
 
 /// A weighted mean of vectors.
 #[derive(Default)]

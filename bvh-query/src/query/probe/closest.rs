@@ -12,6 +12,7 @@ use crate::isa::{Isa, Lanes, Task};
 use crate::leaf::frame::scale_of;
 use crate::leaf::point::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_below, triangles_within};
+use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::pose::Pose;
 use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{placed, stored};
@@ -19,7 +20,6 @@ use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::querier::Querier;
-use crate::traverse::align::round_up;
 use crate::traverse::point_filter::PointFilter;
 use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
@@ -29,13 +29,6 @@ use bvh_format::slabs::Group;
 
 /// Bounded triangles kept before the nearest are measured and the rest is thinned out.
 const MAX_BOUNDED: usize = 256;
-
-/// A limit in `f64` is larger than what it comes from by this factor, so that no rounding of `f64` matters.
-const LIMIT_WIDENING: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
-
-/// A pose may be 2^-20 from rigid, entry by entry, so that lengths in an object's frame may differ from those in the frame of a
-/// question by 2^-19 of themselves. A bound may come from one triangle and decide about another: that counts twice.
-const MAX_STRETCH: f64 = 1.0 + 1.0 / (1 << 17) as f64;
 
 /// The closest triangle so far.
 #[derive(Clone, Copy)]
@@ -107,7 +100,7 @@ impl Querier {
             point: *point,
             is_within,
             within,
-            limit: within * LIMIT_WIDENING,
+            limit: within * (1.0 + SLACK),
             best: None,
             settled_lower: f64::INFINITY,
         };
@@ -289,7 +282,7 @@ impl<'a> Nearest<'a> {
                 self.search.best = Some(Best { closest, object: self.number, place });
             }
             self.search.settled_lower = self.search.settled_lower.min(closest.lower);
-            self.limit = self.limit.min(round_up(closest.upper * LIMIT_WIDENING * self.stretch * self.scale));
+            self.limit = self.limit.min(round_up(closest.upper * (1.0 + SLACK) * self.stretch * self.scale));
         }
         self.bounded.clear();
         Ok(())

@@ -12,12 +12,12 @@ use crate::leaf::frame::scale_of;
 use crate::leaf::line::{crossed, direction};
 use crate::leaf::point::LocalPoint;
 use crate::narrow::{Point, Triangle};
+use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::query::answers::QueryStats;
 use crate::query::exact::{placed, stored};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::sum_of_magnitudes;
 use crate::query::querier::Querier;
-use crate::traverse::align::round_up;
 use crate::traverse::line_filter::{LineFilter, Segment};
 use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
@@ -147,9 +147,6 @@ struct Clipped {
     radius: f64,
 }
 
-/// What a share of a segment is enlarged by for all roundings of f64.
-const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
-
 impl Clipped {
     #[inline(always)]
     fn new(line: &Line, into: &IntoObject, limit: f64, radius: f64) -> Option<Self> {
@@ -157,7 +154,7 @@ impl Clipped {
         // A point of the line in the box is at most twice as far along it as the magnitudes of both add up to.
         let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin) + radius));
         // A pose may stretch: see `closest`.
-        let error = error + radius * (1.0 + 1.0 / (1 << 17) as f64);
+        let error = error + radius * MAX_STRETCH;
         let [start, end] = range_in_box(&origin, &direction, &into.bounds, error)?;
         let (start, end) = (start.max(0.0), end.min(limit));
         if start > end {

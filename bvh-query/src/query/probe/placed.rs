@@ -3,6 +3,7 @@
 use crate::file::bvh::Bvh;
 use crate::file::owned_shape::OwnedShape;
 use crate::file::shape::Shape;
+use crate::numerics::PROBE_ERROR;
 use crate::pose::Pose;
 use crate::pose::frames::{inverse, turn};
 use bvh_format::object::Object;
@@ -49,11 +50,6 @@ impl<'a> From<&'a OwnedShape> for PlacedShape<'a> {
         shape.shape().into()
     }
 }
-
-/// The relative error of taking a probe into the frame of an object, and of the placed vertices: 2^-45 of the magnitudes of
-/// what is added. With v = 2^-53, the coordinates of a point are off by 54v, those of a translation by 64v (see
-/// `Placement::inverse`), and placed vertices by 8v.
-const ERROR: f64 = 1.0 / (1u64 << 45) as f64;
 
 /// The transform from the frame of the probes to that of an object, around its origin.
 #[derive(Clone, Copy, Debug)]
@@ -135,6 +131,6 @@ impl IntoObject {
     /// coordinates have magnitudes of this sum.
     #[inline(always)]
     pub(crate) fn error(&self, magnitude: f64) -> f64 {
-        ERROR * (self.magnitude + magnitude) + self.left_out
+        PROBE_ERROR * (self.magnitude + magnitude) + self.left_out
     }
 }

@@ -2,11 +2,8 @@
 
 use crate::error::{NumberError, QueryError};
 use crate::narrow::Point;
+use crate::numerics::LEAST_COORDINATE;
 use bvh_format::object::MAX_COORDINATE;
-
-/// Coordinates of points below this, 2^-213 mesh units, count as 0: all others are multiples of 2^-266, as exact arithmetic
-/// needs them (`narrow`).
-const LEAST_COORDINATE: f64 = f64::from_bits((1023 - 213) << 52);
 
 /// Refuses a point beyond the range of files. Coordinates too small for exact arithmetic become 0.
 pub(crate) fn check_point(point: &Point) -> Result<Point, QueryError> {

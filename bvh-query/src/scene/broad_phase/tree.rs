@@ -6,10 +6,10 @@
 //! changed are computed once for all of them.
 
 use crate::isa::{Isa, Lanes};
+use crate::numerics::{MAX_STRETCH, round_up};
 use crate::scene::broad_phase::Item;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
-use crate::traverse::align::round_up;
 
 /// The most children of a node.
 const WIDTH: usize = 16;
@@ -312,7 +312,7 @@ impl Tree {
 /// Returns a limit for [`Tree::near`] that leaves all boxes whose squared gap is at most `squared`.
 pub(super) fn squared_limit(squared: f64) -> f32 {
     // More than the roundings of `near`, and than `WorldBox::squared_gap` takes off.
-    round_up(squared * (1.0 + 1.0 / (1 << 17) as f64))
+    round_up(squared * MAX_STRETCH)
 }
 
 /// Returns the number of children of a node of so many instances: as few as have room for them, if all but the last are

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::isa::{Backend, Task};
+use crate::numerics::POSE_ERROR;
 use crate::pose::Pose;
 use crate::traverse::decode::{Parent, decode_group};
-use crate::traverse::placement::POSE_ERROR;
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::{Packet, TriangleEncoding};
 use bvh_format::page::{Page, PageShape, PageWriter, TightBound, WrittenPage};
