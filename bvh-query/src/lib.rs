@@ -26,9 +26,8 @@
 //! whether two meshes touch, how far apart they are and whether they are within a distance in less time, for poses that
 //! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
 //! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
-//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the features `trace` and `stages`
-//! are for tools: one records which nodes and packets a question visits, the other measures how long the stages of a
-//! question take. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
+//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the feature `trace`
+//! is for tools: it records which nodes and packets a question visits. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
 //! the world, in the world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
 //! A query about two meshes walks both trees together, and one about a point or a line walks one tree. Nodes and triangles
@@ -148,13 +147,6 @@ pub struct Embedded<B: ?Sized>(pub B);
 #[cfg(feature = "trace")]
 pub mod trace {
     pub use crate::traverse::trace::{Step, record};
-}
-
-/// What the stages of a question take.
-#[cfg(feature = "stages")]
-pub mod stages {
-    pub use crate::isa::ticks::ticks;
-    pub use crate::traverse::stages::{Spent, Stage, record};
 }
 
 pub use bvh_format::leaf::TriangleEncoding;

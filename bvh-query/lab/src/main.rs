@@ -17,8 +17,6 @@ mod exact {
 }
 mod output;
 mod search;
-#[cfg(feature = "stages")]
-mod stages;
 
 use arguments::{Arguments, Experiment};
 use clap::Parser;
@@ -30,8 +28,6 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 fn main() -> ExitCode {
     let result = match &Arguments::parse().experiment {
         Experiment::Search(arguments) => search::run(arguments),
-        #[cfg(feature = "stages")]
-        Experiment::Stages(arguments) => stages::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {
         Ok(()) => ExitCode::SUCCESS,

@@ -99,9 +99,6 @@ pub(crate) mod scalar;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 #[allow(unsafe_code, reason = "loads and stores; each says why it is sound")]
 mod simd128;
-#[cfg(feature = "stages")]
-#[allow(unsafe_code, reason = "reads a register of the CPU")]
-pub(crate) mod ticks;
 
 use bvh_format::slabs::Group;
 use corners::Corners;

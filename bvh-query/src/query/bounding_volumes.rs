@@ -2,7 +2,6 @@
 
 use crate::numerics::SLACK;
 use crate::traverse::placement::{ObjectPair, Placement};
-use crate::traverse::stages::Stage;
 use bvh_format::object::Object;
 
 /// Returns a lower bound of the distance of two objects by their bounding spheres, in mesh units. It is negative if the
@@ -19,7 +18,6 @@ pub(super) fn sphere_gap(placement: &Placement, a: &Object, b: &Object) -> f64 {
 
 /// Returns whether the bounding spheres or boxes of two objects show that the objects do not touch.
 pub(super) fn surely_apart(ObjectPair { placement, object_a, object_b, .. }: &ObjectPair<'_>) -> bool {
-    let _stage = Stage::Volumes.enter();
     sphere_gap(placement, object_a, object_b) > 0.0 || boxes_apart(placement, object_a, object_b)
 }
 

@@ -15,7 +15,6 @@ use crate::query::exact::RecentTriangles;
 use crate::query::placed_pair::{Found, PlacedPair, Visit, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::node_filter::Measure;
-use crate::traverse::stages::Stage;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 
@@ -139,7 +138,6 @@ impl Candidates<'_> {
 
     #[inline(never)]
     fn intersect(&mut self, candidate: TrianglePair) -> Result<bool, QueryError> {
-        let _stage = Stage::Exact.enter();
         self.stats.exact_tests += 1;
         let TrianglePair { a, b, lane_a, lane_b } = candidate;
         let [recent_a, recent_b] = &mut *self.recent;

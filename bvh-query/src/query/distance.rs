@@ -14,7 +14,6 @@ use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::{limit_of_cores, sum_of_radii};
 use crate::query::search::{Best, Finalists, Nearest, Search, ids};
-use crate::traverse::stages::Stage;
 
 impl Querier {
     /// Returns the least distance of the meshes, with B placed by `pose` in A's frame, both closest points and their
@@ -140,9 +139,7 @@ impl Querier {
     ) -> Result<(), QueryError> {
         each_pair(a, b, pose, |placed| {
             self.memory.budget.visit()?;
-            let stage = Stage::Volumes.enter();
             let gap = sphere_gap(placed.pair.placement, placed.pair.object_a, placed.pair.object_b);
-            stage.leave();
             if gap > f64::from(search.limit()) {
                 return Ok(None);
             }

@@ -10,7 +10,6 @@ use crate::leaf::placed_packet::{PlacedPacket, PlacedPackets};
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
 use crate::traverse::placement::{ObjectPair, Placement};
-use crate::traverse::stages::Stage;
 use crate::traverse::walk::{Visitor, traverse};
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
@@ -68,7 +67,6 @@ impl PlacedPair<'_> {
         packets.forget_others((self.pair.bvh_a.identity(), self.frame().scale.to_bits()));
         let mut place = packets.place(leaf.page, leaf.packet);
         if !place.is_known() {
-            let _stage = Stage::Place.enter();
             let ObjectPair { bvh_a, object_a, .. } = self.pair;
             let room = &mut Packet::default();
             place.packet.place_a(isa, self.frame(), bvh_a.packet(isa, object_a, leaf, room)?);
@@ -87,7 +85,6 @@ impl PlacedPair<'_> {
     ) -> Result<&'a PlacedPacket, QueryError> {
         let mut place = packets.place(leaf.page, leaf.packet);
         if !place.is_known() {
-            let _stage = Stage::Place.enter();
             let ObjectPair { bvh_b, object_b, .. } = self.pair;
             let room = &mut Packet::default();
             place.packet.place_b(isa, self.frame(), bvh_b.packet(isa, object_b, leaf, room)?);

@@ -19,7 +19,6 @@ use crate::query::exact::TriangleDistance;
 use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{Found, PlacedPair, Visit};
 use crate::traverse::node_filter::Measure;
-use crate::traverse::stages::Stage;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
 
@@ -295,7 +294,6 @@ impl Finalists<'_> {
     /// Decides whether a pair is within the distance, and tells of it if it is.
     #[inline(never)]
     fn decide<I: Isa>(&mut self, isa: I, pair: TrianglePair) -> Result<ControlFlow<()>, QueryError> {
-        let _stage = Stage::Exact.enter();
         self.stats.exact_tests += 1;
         let Some(each) = &mut self.each_within else { return Ok(ControlFlow::Continue(())) };
         let a = self.placed.triangle_a(pair.a, pair.lane_a)?;
@@ -317,7 +315,6 @@ impl Finalists<'_> {
         pair: TrianglePair,
         may_touch: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
-        let _stage = Stage::Exact.enter();
         self.stats.exact_tests += 1;
         self.search.settle(isa, self.placed, pair, may_touch)?;
         Ok(if self.search.done { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })

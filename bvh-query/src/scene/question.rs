@@ -214,30 +214,6 @@ impl Scene {
         Ok(of_pairs.into_iter().flat_map(with_pair).collect())
     }
 
-    /// Calls `visit` with each pair that is at most `d` apart, in ascending order, until it breaks. Later pairs are not
-    /// tested. It uses one thread.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::pairs_within`], for pairs up to that one.
-    pub fn visit_pairs_within(
-        &mut self,
-        d: f64,
-        mut visit: impl FnMut(ScenePair) -> ControlFlow<()>,
-    ) -> Result<(), SceneError> {
-        check_distance(d)?;
-        self.each_piece(d, &mut |scene, near_pairs| {
-            scene.remember(&near_pairs);
-            for near_pair in near_pairs {
-                let found = scene
-                    .each(&[near_pair], |querier, pair| Ok(pair.within(querier, d)?.then_some(pair.ids)))?;
-                if found.into_iter().any(|pair| visit(pair).is_break()) {
-                    return Ok(ControlFlow::Break(()));
-                }
-            }
-            Ok(ControlFlow::Continue(()))
-        })
-    }
-
     /// Calls `visit` with each pair of instances that touch and its pairs of triangles in contact, in ascending order of the
     /// pairs, until it breaks. At any time it holds the contacts of one pair, not of all. It uses one thread.
     ///

@@ -18,8 +18,6 @@ pub(crate) mod point_filter;
 pub(crate) mod probe_walk;
 pub(crate) mod slab_filter;
 pub(crate) mod slab_memory;
-#[cfg_attr(not(feature = "stages"), allow(dead_code, unreachable_pub, reason = "the feature publishes it"))]
-pub(crate) mod stages;
 #[cfg(feature = "trace")]
 pub(crate) mod trace;
 pub(crate) mod walk;

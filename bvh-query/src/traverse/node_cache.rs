@@ -10,7 +10,6 @@ use crate::isa::Isa;
 use crate::isa::cache::second_level_kib;
 use crate::traverse::cached_node::{CachedNode, ChildInfo, ChildRef, DecodeNode, Spread};
 use crate::traverse::node_filter::Reach;
-use crate::traverse::stages::Stage;
 use bvh_format::object::Object;
 use bvh_format::{FormatError, Rule};
 
@@ -180,7 +179,6 @@ impl NodeCache {
         if let Some(known) = self.child(at).opened() {
             return Ok(known);
         }
-        let _stage = Stage::Decode.enter();
         *left = left.checked_sub(1).ok_or_else(|| too_many(bvh, object, max_nodes(object)))?;
         let number = self.room(bvh, object)?;
         let (before, behind) = self.nodes.split_at_mut(number);

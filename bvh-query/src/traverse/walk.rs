@@ -36,7 +36,6 @@ use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
-use crate::traverse::stages::Stage;
 #[cfg(feature = "trace")]
 use crate::traverse::trace;
 use bvh_format::slabs::Group;
@@ -161,7 +160,6 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     budget: &mut Budget,
     visitor: &mut W,
 ) -> Result<u64, QueryError> {
-    let _stage = Stage::Walk.enter();
     memory.start(isa, pair, W::SWEEPS)?;
     if W::MEASURE == Measure::Leaving {
         memory.node_filter.prepare_ways(visitor.direction());
@@ -172,7 +170,6 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
         PairWalk { pair, memory, budget, visitor, limit: 0.0, witness: None, order, phase, tests: 0 };
     walk.follow_visitor();
     if walk.visit_all(isa)?.is_continue() {
-        let _stage = Stage::Finish.enter();
         isa.run(Finish(&mut *walk.visitor))?;
     }
     Ok(walk.tests)
@@ -291,7 +288,6 @@ impl PairMemory {
     /// Starts a walk.
     #[inline(always)]
     fn start<I: Isa>(&mut self, isa: I, pair: &ObjectPair<'_>, sweeps: bool) -> Result<(), QueryError> {
-        let _stage = Stage::Prepare.enter();
         self.walk += 1;
         self.stack.clear();
         self.leaf_pairs.clear();
@@ -344,7 +340,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             self.memory.list.push_one(roots);
         }
         loop {
-            let stage = Stage::Choose.enter();
             if W::MAY_BE_BEST_FIRST && self.order != Order::Any {
                 self.memory.stack.drop_beyond(self.limit);
             }
@@ -362,7 +357,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     None => return Ok(ControlFlow::Continue(())),
                 },
             };
-            stage.leave();
             self.budget.visit()?;
             // Depth-first, pairs of leaf packets never come on the stack.
             if W::MAY_BE_BEST_FIRST
@@ -382,9 +376,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             if self.is_beyond_large_leaf(next)? {
                 continue;
             }
-            let stage = Stage::Open.enter();
             let sides = self.open(isa, next)?;
-            stage.leave();
             self.push_children(isa, sides);
             if self.phase() == Phase::BestFirst && self.memory.list.len() > MAX_LISTED_TESTS {
                 self.go_on_depth_first();
@@ -430,7 +422,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     ) -> Result<ControlFlow<()>, QueryError> {
         #[cfg(feature = "trace")]
         trace::packets(leaves);
-        let _stage = Stage::Packets.enter();
         let flow = isa.run(VisitLeaves { visitor: &mut *self.visitor, leaves, at_once })?;
         self.follow_visitor();
         Ok(flow)
@@ -459,7 +450,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         if W::SWEEPS || self.tests < NODE_TESTS_BEFORE_TRIANGLE_BOUNDS {
             return Ok(false);
         }
-        let _stage = Stage::LargeLeaf.enter();
         let PairMemory { node_filter, nodes, large_leaves, .. } = &mut *self.memory;
         large_leaves.are_beyond(self.pair, nodes, node_filter.reaches(), entry, gap_limit::<W>(self.limit))
     }
@@ -470,7 +460,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         let (pair, tests) = (self.pair, self.tests);
         let PairMemory { node_filter, nodes, left, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
-            let _stage = Stage::PrepareAlongB.enter();
             node_filter.look_along_b(isa);
         }
         let (a, b) = (nodes.child(entry.a), nodes.child(entry.b));
@@ -511,7 +500,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             // The node above the root of B is not aligned, but meets nothing: both roots are opened at once.
             let (aligned, is_aligned) = aligned_b.of(number_b);
             if !is_aligned {
-                let _stage = Stage::AlignB.enter();
                 isa.run(AlignB { node_filter, group: &node_b.group, to: aligned, sweeps: W::SWEEPS });
             }
             let tested = if phase == Phase::BestFirst { list.room() } else { stack.room() };
@@ -519,13 +507,10 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             tested.b = ChildRef::new(number_b, 0);
             let groups = (&node_a.group, &node_b.group, &*aligned);
             let (lanes_a, lanes_b) = (node_a.lanes, node_b.lanes);
-            let stage = Stage::TestAlongA.enter();
             let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
-            stage.leave();
             mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
             if mask != 0 {
                 if slabs.are_due() {
-                    let _stage = Stage::Slabs.enter();
                     let numbers = (number_a, number_b);
                     let memory = &mut *slabs;
                     mask = isa.run(TestSlabs {
@@ -542,10 +527,8 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                 if mask != 0 && node_filter.looks_along_b() {
                     let (to, is_aligned) = aligned_a.of(number_a);
                     if !is_aligned {
-                        let _stage = Stage::AlignA.enter();
                         isa.run(AlignA { node_filter, group: &node_a.group, to });
                     }
-                    let _stage = Stage::TestAlongB.enter();
                     let groups = (&*to, &node_b.group);
                     mask &= node_filter.run_along_b(isa, measure, groups, limit, &mut tested.bounds);
                 }
@@ -553,7 +536,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                     let groups = (&node_a.group, &*aligned);
                     mask &= node_filter.leaving(isa, groups, leaving_limit, &mut tested.bounds);
                 }
-                let stage = Stage::Keep.enter();
                 if phase == Phase::DepthFirst {
                     let leaves = lanes_a.leaves[0] & lanes_b.leaves[1];
                     leaf_pairs.append(tested, mask & leaves);
@@ -570,7 +552,6 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
                         Phase::Dive => stack.push(mask & 1u16 << (first & 15), first),
                     }
                 }
-                stage.leave();
             }
             self.tests += 1;
             if node_b.continues & of_b.all {

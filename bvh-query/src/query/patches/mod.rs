@@ -97,11 +97,6 @@ impl Patches {
     pub fn is_truncated(&self) -> bool {
         (self.regions.len() as u64) < self.total
     }
-
-    /// Returns the contacts of a patch.
-    pub fn regions_of(&self, patch: &Patch) -> &[ContactRegion] {
-        self.regions.get(patch.first..patch.first.saturating_add(patch.count)).unwrap_or(&[])
-    }
 }
 
 impl Querier {

@@ -17,7 +17,7 @@ fn patches(a: &Bvh, b: &Bvh, pose: &Pose, options: &PatchOptions) -> Patches {
     for patch in &first.patches {
         assert_eq!(patch.first, place, "{patch:?}");
         place += patch.count;
-        let contacts = first.regions_of(patch);
+        let contacts = &first.regions[patch.first..][..patch.count];
         assert!(contacts.is_sorted_by(|p, q| p.contact < q.contact) && contacts.len() == patch.count);
         assert!(patch.normal == [0.0; 3] || is_close(dot(patch.normal, patch.normal), 1.0), "{patch:?}");
         let numbers = [patch.center, patch.normal, [patch.length, patch.area, patch.depth]];

@@ -22,7 +22,7 @@ fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&s
         paths.iter().map(|&(id, path)| (id, path as &(dyn RigidPath + Sync))).collect();
     let options = &MotionOptions::new();
     let (point, ray) = ([0.1, 0.2, 0.3], Ray::new([0.1, 0.2, -3.0], [0.3, 0.2, 1.0]));
-    let asks: [(&str, AskScene<'_>); 18] = [
+    let asks: [(&str, AskScene<'_>); 17] = [
         ("collide", &|s| text(s.collide())),
         ("within", &|s| text(s.within(0.01))),
         ("pairs_in_contact", &|s| text(s.pairs_in_contact())),
@@ -39,14 +39,6 @@ fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&s
         ("any_hits", &|s| text(s.any_hits(&[ray]))),
         ("all_hits", &|s| text(s.all_hits(&[ray]))),
         ("segment_hits", &|s| text(s.segment_hits(&[[[9.0; 3], point]]))),
-        ("visit_pairs_within", &|s| {
-            let mut all = Vec::new();
-            s.visit_pairs_within(0.01, |pair| {
-                all.push(pair);
-                ControlFlow::Continue(())
-            })?;
-            Ok(format!("{all:?}"))
-        }),
         ("visit_contacts", &|s| {
             let mut all = Vec::new();
             s.visit_contacts(|pair, contacts| {
@@ -197,15 +189,6 @@ fn pairs_in_pieces_are_all_pairs() {
                     })
                     .unwrap();
                 assert_eq!(all, contacts);
-                let (mut calls, last) = (0, near[near.len() - 2]);
-                scene
-                    .visit_pairs_within(d, |pair| {
-                        assert_eq!(pair, near[calls]);
-                        calls += 1;
-                        if pair == last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-                    })
-                    .unwrap();
-                assert_eq!(calls, near.len() - 1);
                 // A budget that suffices changes nothing, on any number of threads.
                 scene.set_budget(1 << 40);
                 assert_eq!(scene.pairs_within(d).unwrap(), near);
@@ -273,7 +256,7 @@ fn the_pairs_of_a_scene_are_not_all_kept() {
         scene.set_tracking(tracking);
         let mut pairs = 0;
         let (bytes, visited) = peak(|| {
-            scene.visit_pairs_within(0.0, |_| {
+            scene.visit_contacts(|_, _| {
                 pairs += 1;
                 if pairs == 200_000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })

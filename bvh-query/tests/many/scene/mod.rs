@@ -114,14 +114,6 @@ fn ask(scene: &mut Scene) -> Answers {
         })
         .unwrap();
     assert_eq!(visited, contacts.iter().map(|of| (of.pair, of.contact)).collect::<Vec<_>>());
-    let mut some = Vec::new();
-    scene
-        .visit_pairs_within(D, |pair| {
-            some.push(pair);
-            if some.len() == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        })
-        .unwrap();
-    assert_eq!(some, scene.pairs_within(D).unwrap().into_iter().take(2).collect::<Vec<_>>());
     let mut first = None;
     scene
         .visit_contacts(|pair, contacts| {
