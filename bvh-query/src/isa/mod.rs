@@ -170,27 +170,27 @@ pub(crate) fn in_order(number: f32) -> i32 {
 /// The token of a backend, and the operations that its CPU features allow.
 pub(crate) trait Isa: Copy {
     /// A register of sixteen lanes.
-    type V: Lanes;
+    type F32x16: Lanes;
     /// A register of four lanes.
-    type H: Lanes;
+    type F32x4: Lanes;
     /// A register of `f64` for three corners.
-    type C: Corners;
+    type F64x3: Corners;
     /// The rows of a group, in the form that `pick` reads.
     type Rows<'a>: Copy;
 
-    fn corners(self, from: [f64; 3]) -> Self::C;
+    fn corners(self, from: [f64; 3]) -> Self::F64x3;
 
-    fn splat(self, value: f32) -> Self::V;
-    fn load(self, from: &[f32; 16]) -> Self::V;
-    fn store(self, value: Self::V, to: &mut [f32; 16]);
+    fn splat(self, value: f32) -> Self::F32x16;
+    fn load(self, from: &[f32; 16]) -> Self::F32x16;
+    fn store(self, value: Self::F32x16, to: &mut [f32; 16]);
     /// Lane `4 * i + j` is `from[i]`.
-    fn repeat(self, from: &[f32; 4]) -> Self::V;
+    fn repeat(self, from: &[f32; 4]) -> Self::F32x16;
     /// Lane `4 * i + j` is `from[j]`.
-    fn tile(self, from: &[f32; 4]) -> Self::V;
+    fn tile(self, from: &[f32; 4]) -> Self::F32x16;
     /// Lane `4 * i + j` is `from[i][j]`.
-    fn quads(self, from: [&[f32; 4]; 4]) -> Self::V;
+    fn quads(self, from: [&[f32; 4]; 4]) -> Self::F32x16;
     /// Lane `4 * i + j` is lane `4 * i + column`.
-    fn quad_splat(self, value: Self::V, column: usize) -> Self::V;
+    fn quad_splat(self, value: Self::F32x16, column: usize) -> Self::F32x16;
     /// Prepares a group for `pick`.
     fn rows<'a>(self, group: &'a Group) -> Self::Rows<'a>;
     /// Prepares four calls of `pick`, for four of 16 rows each. The lowest five bits of a word are the row, 16 more for upper
@@ -206,35 +206,35 @@ pub(crate) trait Isa: Copy {
         }
     }
     /// Returns four rows of a group, all of one part, and the opposite ends of the same slabs.
-    fn pick(self, rows: &Self::Rows<'_>, part: Part, places: &[u32; 16]) -> (Self::V, Self::V);
+    fn pick(self, rows: &Self::Rows<'_>, part: Part, places: &[u32; 16]) -> (Self::F32x16, Self::F32x16);
 
     /// Applies `bvh_format::quantize::round_step_up` to each lane.
-    fn round_step_up(self, step: Self::V) -> Self::V;
+    fn round_step_up(self, step: Self::F32x16) -> Self::F32x16;
 
     /// Reads 16 codes of one byte each.
-    fn codes_u8(self, from: &[u8; 16]) -> Self::V;
+    fn codes_u8(self, from: &[u8; 16]) -> Self::F32x16;
     /// Reads the low nibbles of 16 bytes.
-    fn codes_low(self, from: &[u8; 16]) -> Self::V;
+    fn codes_low(self, from: &[u8; 16]) -> Self::F32x16;
     /// Reads the high nibbles of 16 bytes.
-    fn codes_high(self, from: &[u8; 16]) -> Self::V;
+    fn codes_high(self, from: &[u8; 16]) -> Self::F32x16;
     /// Reads the codes for which the low nibbles of 16 bytes of a short treelet stand.
-    fn short_codes_low(self, from: &[u8; 16]) -> Self::V;
+    fn short_codes_low(self, from: &[u8; 16]) -> Self::F32x16;
     /// Reads the codes for which the high nibbles of 16 bytes of a short treelet stand.
-    fn short_codes_high(self, from: &[u8; 16]) -> Self::V;
+    fn short_codes_high(self, from: &[u8; 16]) -> Self::F32x16;
     /// Reads 16 little-endian `f16`.
-    fn codes_f16(self, from: &[u8; 32]) -> Self::V;
+    fn codes_f16(self, from: &[u8; 32]) -> Self::F32x16;
     /// Reads 16 little-endian `f32`.
-    fn codes_f32(self, from: &[u8; 64]) -> Self::V;
+    fn codes_f32(self, from: &[u8; 64]) -> Self::F32x16;
 
     /// The offsets for which the integers of a packed leaf block stand: divided by this number, or as the bits of ordered
     /// `f32`.
-    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Self::V;
+    fn coordinates(self, integers: &[i32; 16], divisor: Option<f64>) -> Self::F32x16;
     /// Lane i is lane `places[i]`, modulo 16, of `value`.
-    fn permute(self, value: Self::V, places: &[u8; 16]) -> Self::V;
+    fn permute(self, value: Self::F32x16, places: &[u8; 16]) -> Self::F32x16;
 
-    fn splat4(self, value: f32) -> Self::H;
-    fn load4(self, from: &[f32; 4]) -> Self::H;
-    fn store4(self, value: Self::H, to: &mut [f32; 4]);
+    fn splat4(self, value: f32) -> Self::F32x4;
+    fn load4(self, from: &[f32; 4]) -> Self::F32x4;
+    fn store4(self, value: Self::F32x4, to: &mut [f32; 4]);
 
     /// The lane of the least of the elements whose bits are set, none of which is NaN; of equal ones, the first. Without any
     /// bit set, no lane: 16 or more.

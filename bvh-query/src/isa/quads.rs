@@ -127,9 +127,9 @@ impl<Q> Clone for Quads<Q> {
 impl<Q> Copy for Quads<Q> {}
 
 impl<Q: Quad> Isa for Quads<Q> {
-    type V = Four<Q>;
-    type H = Q;
-    type C = Three;
+    type F32x16 = Four<Q>;
+    type F32x4 = Q;
+    type F64x3 = Three;
     type Rows<'a> = &'a Group;
 
     #[inline(always)]

@@ -230,10 +230,11 @@ impl Task for OfCorners {
     fn run<I: Isa>(self, isa: I) -> Self::Output {
         let (x, y, two) = (isa.corners(self.0), isa.corners(self.1), isa.corners([2.0; 3]));
         let (less, small) = (x.lt(y), x.lt(two));
-        let both = <I::C as Corners>::and(less, small);
+        let both = <I::F64x3 as Corners>::and(less, small);
         let all = [x.add(y), x.sub(y), x.mul(y), x.div(y), x.min(y), x.max(y), x.abs()];
         let [add, sub, mul, div, min, max, abs] = all;
-        let (less, both) = (<I::C as Corners>::select(less, x, y), <I::C as Corners>::select(both, x, y));
+        let (less, both) =
+            (<I::F64x3 as Corners>::select(less, x, y), <I::F64x3 as Corners>::select(both, x, y));
         let all = [
             add.all(),
             sub.all(),
@@ -297,12 +298,12 @@ impl Task for Compare<'_> {
         let (a, b) = (isa.load(self.0), isa.load(self.1));
         let (le, lt) = (a.le(b), a.lt(b));
         let values =
-            [a.min(b), a.max(b), a.max_of_numbers(b), I::V::select(lt, a, b), isa.quad_splat(a, self.2)];
+            [a.min(b), a.max(b), a.max_of_numbers(b), I::F32x16::select(lt, a, b), isa.quad_splat(a, self.2)];
         let mut lanes = [[0.0; 16]; 5];
         for (value, lanes) in values.into_iter().zip(&mut lanes) {
             isa.store(value, lanes);
         }
-        ([I::V::bits(le), I::V::bits(lt)], lanes)
+        ([I::F32x16::bits(le), I::F32x16::bits(lt)], lanes)
     }
 }
 

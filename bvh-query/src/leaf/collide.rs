@@ -86,7 +86,7 @@ pub(crate) fn face_planes<I: Isa>(isa: I, local: &Local<'_>, a: LeafPacket, b: L
 
 /// The errors of projections on the normals of four faces.
 #[inline(always)]
-fn error<I: Isa>(isa: I, local: &Local<'_>, packet: &PlacedPacket) -> I::H {
+fn error<I: Isa>(isa: I, local: &Local<'_>, packet: &PlacedPacket) -> I::F32x4 {
     let edge = isa.load4(&packet.edge);
     let relative = edge.mul_add(isa.splat4(112.0 * U), isa.splat4(48.0 * local.error));
     edge.mul(isa.splat4(local.reach)).mul_add(relative, isa.splat4(CUBE_UNDERFLOW))
@@ -94,17 +94,29 @@ fn error<I: Isa>(isa: I, local: &Local<'_>, packet: &PlacedPacket) -> I::H {
 
 /// Where three points are: all certainly on one side of a plane, or certainly on both.
 #[inline(always)]
-fn sides<I: Isa>(isa: I, normal: Vec3<I::V>, offset: I::V, error: I::V, points: &Corners<I::V>) -> Sides {
+fn sides<I: Isa>(
+    isa: I,
+    normal: Vec3<I::F32x16>,
+    offset: I::F32x16,
+    error: I::F32x16,
+    points: &Corners<I::F32x16>,
+) -> Sides {
     let heights = project(points, normal);
     let (lowest, highest) = (min3(heights).sub(offset), max3(heights).sub(offset));
     let below_error = isa.splat(0.0).sub(error);
-    let apart = I::V::bits(error.lt(lowest)) | I::V::bits(highest.lt(below_error));
-    Sides { apart, overlap: I::V::bits(lowest.lt(below_error)) & I::V::bits(error.lt(highest)) }
+    let apart = I::F32x16::bits(error.lt(lowest)) | I::F32x16::bits(highest.lt(below_error));
+    Sides { apart, overlap: I::F32x16::bits(lowest.lt(below_error)) & I::F32x16::bits(error.lt(highest)) }
 }
 
 /// Stage two: the nine cross products of edges.
 #[inline(always)]
-fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, reach: I::V) -> Sides {
+fn edge_axes<I: Isa>(
+    isa: I,
+    a: &Corners<I::F32x16>,
+    b: &Corners<I::F32x16>,
+    error: I::F32x16,
+    reach: I::F32x16,
+) -> Sides {
     let (edges_a, edges_b) = (edges(a), edges(b));
     let edge = largest_of(&edges_a).max(largest_of(&edges_b));
     let relative = edge.mul_add(isa.splat(112.0 * U), error.mul(isa.splat(48.0)));
@@ -122,8 +134,8 @@ fn edge_axes<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>, error: I::V, 
             let gap_up = b0.min(b1).sub(a0.max(a1));
             let gap_down = a0.min(a1).sub(b0.max(b1));
             let gap = gap_up.max(gap_down);
-            sides.apart |= I::V::bits(error.lt(gap));
-            sides.overlap &= I::V::bits(gap.lt(below_error));
+            sides.apart |= I::F32x16::bits(error.lt(gap));
+            sides.overlap &= I::F32x16::bits(gap.lt(below_error));
         }
     }
     sides

@@ -49,7 +49,7 @@ pub(crate) fn near_along<I: Isa>(isa: I, local: &Local<'_>, direction: [f32; 3],
     let lower = min3(project(&local.b.quads(isa), axis));
     isa.store4(lower.add(local.offset_along(isa, axis)), &mut lower_b);
     let gap = isa.tile(&lower_b).sub(isa.repeat(&upper_a));
-    !I::V::bits(isa.splat(limit + slack(local)).lt(gap))
+    !I::F32x16::bits(isa.splat(limit + slack(local)).lt(gap))
 }
 
 /// Lanes whose triangles may be closer than `limit`, looking along three directions of each pair: from centroid to
@@ -93,7 +93,7 @@ pub(crate) fn swept_near<I: Isa>(isa: I, [start, end]: [&Local<'_>; 2], limit: f
         let of_a = [a[0][axis], a[1][axis], a[2][axis]];
         let of_b = [[from[0][axis], from[1][axis], from[2][axis]], [to[0][axis], to[1][axis], to[2][axis]]];
         let ends_b = join([min3(of_b[0]), max3(of_b[0])], [min3(of_b[1]), max3(of_b[1])]);
-        far |= I::V::bits(plain.lt(gap([min3(of_a), max3(of_a)], ends_b)));
+        far |= I::F32x16::bits(plain.lt(gap([min3(of_a), max3(of_a)], ends_b)));
     }
     let squared = isa.splat(limit * limit);
     let normal = repeat(isa, &start.a.normal);
@@ -118,7 +118,7 @@ pub(crate) fn swept_near<I: Isa>(isa: I, [start, end]: [&Local<'_>; 2], limit: f
 
 /// The sum of vectors of B at both ends, in the lanes of their pairs.
 #[inline(always)]
-fn tile_sum<I: Isa>(isa: I, start: &[[f32; 4]; 3], end: &[[f32; 4]; 3]) -> Vec3<I::V> {
+fn tile_sum<I: Isa>(isa: I, start: &[[f32; 4]; 3], end: &[[f32; 4]; 3]) -> Vec3<I::F32x16> {
     add(tile(isa, start), tile(isa, end))
 }
 
@@ -144,11 +144,11 @@ fn gap<V: Lanes>([lo_a, hi_a]: [V; 2], [lo_b, hi_b]: [V; 2]) -> V {
 /// Lanes where a gap, over the length of its direction, exceeds a limit. Squares below 2^-100 may have underflown, and
 /// tell nothing; those that overflow compare as they should.
 #[inline(always)]
-fn far_along<I: Isa>(isa: I, gap: I::V, squared: I::V, limit_squared: I::V) -> u16 {
+fn far_along<I: Isa>(isa: I, gap: I::F32x16, squared: I::F32x16, limit_squared: I::F32x16) -> u16 {
     let (gap, least) = (gap.max(isa.splat(0.0)), isa.splat(MIN_CERTIFIED_SQUARE));
     let gap_squared = gap.mul(gap);
-    let far = I::V::bits(limit_squared.mul(squared).lt(gap_squared));
-    far & I::V::bits(least.le(gap_squared)) & I::V::bits(least.le(squared))
+    let far = I::F32x16::bits(limit_squared.mul(squared).lt(gap_squared));
+    far & I::F32x16::bits(least.le(gap_squared)) & I::F32x16::bits(least.le(squared))
 }
 
 /// The best guess so far.
@@ -161,7 +161,7 @@ pub(super) struct Guess<V> {
 impl<V: Lanes> Guess<V> {
     /// Nothing is guessed yet.
     #[inline(always)]
-    pub(super) fn none<I: Isa<V = V>>(isa: I) -> Self {
+    pub(super) fn none<I: Isa<F32x16 = V>>(isa: I) -> Self {
         Self { squared: isa.splat(f32::INFINITY), direction: [isa.splat(0.0); 3] }
     }
 
@@ -208,13 +208,13 @@ pub(crate) fn swept_bounds<I: Isa>(isa: I, [start, end]: [&TriangleQueue; 2], li
 
 /// The error of the bounds of the pairs in a queue.
 #[inline(always)]
-fn slack_of<I: Isa>(isa: I, queue: &TriangleQueue) -> I::V {
+fn slack_of<I: Isa>(isa: I, queue: &TriangleQueue) -> I::F32x16 {
     queue.error(isa).mul_add(isa.splat(4.0), queue.reach(isa).mul(isa.splat(16.0 * U)))
 }
 
 /// Guesses the closest points of pairs of triangles.
 #[inline(always)]
-fn closest<I: Isa>(isa: I, a: &Corners<I::V>, b: &Corners<I::V>) -> Guess<I::V> {
+fn closest<I: Isa>(isa: I, a: &Corners<I::F32x16>, b: &Corners<I::F32x16>) -> Guess<I::F32x16> {
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
     let mut guess = Guess::none(isa);
     let (edges_a, edges_b) = (edges(a), edges(b));
@@ -259,10 +259,10 @@ pub(super) fn inverse_squares<V: Lanes>(one: V, edges: Corners<V>) -> Vec3<V> {
 #[inline(always)]
 pub(super) fn points_on_face<I: Isa, const N: usize>(
     isa: I,
-    t: &Corners<I::V>,
-    edges: &Corners<I::V>,
-    points: &[Vec3<I::V>; N],
-    guess: &mut Guess<I::V>,
+    t: &Corners<I::F32x16>,
+    edges: &Corners<I::F32x16>,
+    points: &[Vec3<I::F32x16>; N],
+    guess: &mut Guess<I::F32x16>,
     towards: bool,
 ) {
     let (zero, one) = (isa.splat(0.0), isa.splat(1.0));
@@ -285,14 +285,14 @@ pub(super) fn points_on_face<I: Isa, const N: usize>(
 
 /// Bounds distances, given the gaps of the projections on the guessed directions.
 #[inline(always)]
-pub(super) fn certify<I: Isa>(isa: I, slack: I::V, gap: I::V, guess: Guess<I::V>) -> Bounds {
+pub(super) fn certify<I: Isa>(isa: I, slack: I::F32x16, gap: I::F32x16, guess: Guess<I::F32x16>) -> Bounds {
     let least = isa.splat(MIN_CERTIFIED_SQUARE);
     let length = guess.squared.max(least).sqrt();
     let n = guess.direction;
     let shrink = isa.splat(1.0 - 16.0 * U);
     let zero = isa.splat(0.0);
     let lower = gap.div(length).mul(shrink).sub(slack).max(zero);
-    let lower = I::V::select(least.le(guess.squared), lower, zero);
+    let lower = I::F32x16::select(least.le(guess.squared), lower, zero);
     let upper = length.mul_add(isa.splat(1.0 + 16.0 * U), slack);
     let mut bounds = Bounds { lower: [0.0; 16], upper: [0.0; 16], direction: [[0.0; 16]; 3] };
     isa.store(lower, &mut bounds.lower);

@@ -41,5 +41,5 @@ pub(crate) fn crossed<I: Isa>(
     let (ab, bc, ca) = (dot(w, cross(a, b)), dot(w, cross(b, c)), dot(w, cross(c, a)));
     let (least, most) = (ab.min(bc).min(ca), ab.max(bc).max(ca));
     let zero = isa.splat(0.0);
-    !(I::V::bits(certain.lt(most)) & I::V::bits(least.lt(zero.sub(certain))))
+    !(I::F32x16::bits(certain.lt(most)) & I::F32x16::bits(least.lt(zero.sub(certain))))
 }

@@ -45,7 +45,7 @@ impl<'a> Local<'a> {
 
     /// Corners of A in the first index of the pair, those of B in the second, as 16 lanes each.
     #[inline(always)]
-    pub(crate) fn lanes<I: Isa>(&self, isa: I) -> (Corners<I::V>, Corners<I::V>) {
+    pub(crate) fn lanes<I: Isa>(&self, isa: I) -> (Corners<I::F32x16>, Corners<I::F32x16>) {
         let (a, b) = (&self.a.corners, &self.b.corners);
         let [x, y, z] = self.offset;
         let offset = [isa.splat(x), isa.splat(y), isa.splat(z)];
@@ -57,18 +57,18 @@ impl<'a> Local<'a> {
 
     /// Returns how far along four directions the first corner of B's packet is.
     #[inline(always)]
-    pub(crate) fn offset_along<I: Isa>(&self, isa: I, directions: Vec3<I::H>) -> I::H {
+    pub(crate) fn offset_along<I: Isa>(&self, isa: I, directions: Vec3<I::F32x4>) -> I::F32x4 {
         dot(directions, splat4(isa, self.offset))
     }
 }
 
 #[inline(always)]
-pub(crate) fn repeat<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::V> {
+pub(crate) fn repeat<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::F32x16> {
     [isa.repeat(&v[0]), isa.repeat(&v[1]), isa.repeat(&v[2])]
 }
 
 #[inline(always)]
-pub(crate) fn tile<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::V> {
+pub(crate) fn tile<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::F32x16> {
     [isa.tile(&v[0]), isa.tile(&v[1]), isa.tile(&v[2])]
 }
 

@@ -13,7 +13,7 @@ pub(crate) type Corners<T> = [Vec3<T>; 3];
 
 /// Three numbers, each in all of four lanes.
 #[inline(always)]
-pub(crate) fn splat4<I: Isa>(isa: I, v: [f32; 3]) -> Vec3<I::H> {
+pub(crate) fn splat4<I: Isa>(isa: I, v: [f32; 3]) -> Vec3<I::F32x4> {
     [isa.splat4(v[0]), isa.splat4(v[1]), isa.splat4(v[2])]
 }
 

@@ -78,7 +78,7 @@ impl PlacedPacket {
         let mut reach = isa.splat4(0.0);
         for corner in 0..3 {
             let from = &packet.corners[corner];
-            let w: Vec3<I::H> = [
+            let w: Vec3<I::F32x4> = [
                 isa.load4(&from[0]).sub(isa.splat4(origin[0])),
                 isa.load4(&from[1]).sub(isa.splat4(origin[1])),
                 isa.load4(&from[2]).sub(isa.splat4(origin[2])),
@@ -112,7 +112,7 @@ impl PlacedPacket {
 
     /// Corners as four lanes each.
     #[inline(always)]
-    pub(crate) fn quads<I: Isa>(&self, isa: I) -> Corners<I::H> {
+    pub(crate) fn quads<I: Isa>(&self, isa: I) -> Corners<I::F32x4> {
         let c = &self.corners;
         [load4(isa, &c[0]), load4(isa, &c[1]), load4(isa, &c[2])]
     }
@@ -125,7 +125,7 @@ fn first_corner(packet: &Packet) -> [f32; 3] {
 }
 
 #[inline(always)]
-pub(crate) fn load4<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::H> {
+pub(crate) fn load4<I: Isa>(isa: I, v: &[[f32; 4]; 3]) -> Vec3<I::F32x4> {
     [isa.load4(&v[0]), isa.load4(&v[1]), isa.load4(&v[2])]
 }
 
@@ -137,7 +137,7 @@ pub(crate) fn larger(x: f32, y: f32) -> f32 {
 
 /// The largest of four lanes that are not NaN.
 #[inline(always)]
-fn largest_lane<I: Isa>(isa: I, lanes: I::H) -> f32 {
+fn largest_lane<I: Isa>(isa: I, lanes: I::F32x4) -> f32 {
     let mut values = [0.0; 4];
     isa.store4(lanes, &mut values);
     larger(larger(values[0], values[1]), larger(values[2], values[3]))

@@ -42,7 +42,7 @@ impl LocalPoint {
 
     /// Returns the triangles of four packets as the point sees them: lane `4 * packet + triangle`.
     #[inline(always)]
-    pub(super) fn seen<I: Isa>(&self, isa: I, packets: [&Packet; 4]) -> Corners<I::V> {
+    pub(super) fn seen<I: Isa>(&self, isa: I, packets: [&Packet; 4]) -> Corners<I::F32x16> {
         let [a, b, c, d] = packets;
         let (zero, scale) = (isa.splat(0.0), isa.splat(self.scale));
         let mut corners = [[zero; 3]; 3];
@@ -73,7 +73,7 @@ pub(crate) fn point_bounds<I: Isa>(isa: I, packets: [&Packet; 4], point: &LocalP
     let inverse = inverse_squares(one, edges);
     for i in 0..3 {
         let share = clamp(zero, one, zero.sub(dot(corners[i], edges[i])).mul(inverse[i]));
-        let foot: Vec3<I::V> = along(corners[i], share, edges[i]);
+        let foot: Vec3<I::F32x16> = along(corners[i], share, edges[i]);
         guess.improve(foot);
     }
     points_on_face(isa, &corners, &edges, &[[zero; 3]], &mut guess, true);

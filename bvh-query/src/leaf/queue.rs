@@ -100,11 +100,11 @@ impl TriangleQueue {
 
     /// Records of the last pair that each triangle certainly has corners strictly on both sides of the other's plane.
     #[inline(always)]
-    pub(crate) fn last_straddles(&mut self, straddles: bool) {
+    pub(crate) fn mark_last_straddling(&mut self, straddles: bool) {
         self.straddling |= u16::from(straddles) << (self.len.wrapping_sub(1) & 15);
     }
 
-    /// Returns the lanes of which `last_straddles` was told so.
+    /// Returns the lanes that `mark_last_straddling` marked.
     #[inline(always)]
     pub(crate) fn straddling(&self) -> u16 {
         self.straddling
@@ -112,12 +112,12 @@ impl TriangleQueue {
 
     /// Returns the corners of both sides.
     #[inline(always)]
-    pub(crate) fn corners<I: Isa>(&self, isa: I) -> (Corners<I::V>, Corners<I::V>) {
+    pub(crate) fn corners<I: Isa>(&self, isa: I) -> (Corners<I::F32x16>, Corners<I::F32x16>) {
         (self.side(isa, 0), self.side(isa, 1))
     }
 
     #[inline(always)]
-    fn side<I: Isa>(&self, isa: I, side: usize) -> Corners<I::V> {
+    fn side<I: Isa>(&self, isa: I, side: usize) -> Corners<I::F32x16> {
         let c = &self.corners[side];
         [
             [isa.load(&c[0][0]), isa.load(&c[0][1]), isa.load(&c[0][2])],
@@ -128,13 +128,13 @@ impl TriangleQueue {
 
     /// Returns the bounds on the error of the coordinates: see `Local`.
     #[inline(always)]
-    pub(crate) fn error<I: Isa>(&self, isa: I) -> I::V {
+    pub(crate) fn error<I: Isa>(&self, isa: I) -> I::F32x16 {
         isa.load(&self.error)
     }
 
     /// Returns the bounds on the magnitude of the coordinates.
     #[inline(always)]
-    pub(crate) fn reach<I: Isa>(&self, isa: I) -> I::V {
+    pub(crate) fn reach<I: Isa>(&self, isa: I) -> I::F32x16 {
         isa.load(&self.reach)
     }
 

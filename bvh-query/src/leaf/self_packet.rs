@@ -122,7 +122,7 @@ impl SelfPacket {
                 isa.store4(scaled, &mut self.corners[corner][axis]);
             }
         }
-        self.is_comparable = I::H::bits(lost.le(isa.splat4(0.0))) & 0xf == 0xf && !frame.are_corrected;
+        self.is_comparable = I::F32x4::bits(lost.le(isa.splat4(0.0))) & 0xf == 0xf && !frame.are_corrected;
         self.is_exact = self.is_comparable && frame.are_sums;
         // Rounded up; far below 1, as the object is about 1 in size.
         self.left_out = if frame.are_sums { 0.0 } else { (frame.left_out as f32).next_up() * frame.scale };
@@ -180,7 +180,7 @@ impl SelfPacket {
     pub(crate) fn enclose<I: Isa>(&mut self, isa: I, frame: &SelfFrame, packet: &Packet, triangles: u8) {
         for axis in 0..3 {
             let corners = &packet.corners;
-            let of: Vec3<I::H> =
+            let of: Vec3<I::F32x4> =
                 [isa.load4(&corners[0][axis]), isa.load4(&corners[1][axis]), isa.load4(&corners[2][axis])];
             let (lo, hi) = (&mut self.boxes.lo[axis], &mut self.boxes.hi[axis]);
             isa.store4(min3(of), lo);
@@ -220,7 +220,7 @@ impl SelfPacket {
 /// The lanes in which a corner of one triangle is certainly above or below the plane of the other, and those in which it is
 /// one of the other's corners.
 #[derive(Clone, Copy, Default)]
-struct Side {
+struct EdgeSide {
     above: u16,
     below: u16,
     common: u16,
@@ -231,7 +231,7 @@ type Common = [[u16; 3]; 3];
 
 /// The corners of both packets, as 16 lanes each.
 #[inline(always)]
-fn lanes<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (Corners<I::V>, Corners<I::V>) {
+fn lanes<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (Corners<I::F32x16>, Corners<I::F32x16>) {
     let (a, b) = (&a.corners, &b.corners);
     (
         [repeat(isa, &a[0]), repeat(isa, &a[1]), repeat(isa, &a[2])],
@@ -245,16 +245,16 @@ fn apart<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket) -> (u16, Common) {
     let (corners_a, corners_b) = lanes(isa, a, b);
     let (edge_a, edge_b) = (isa.repeat(&a.edge), isa.tile(&b.edge));
     let left_out = a.left_out;
-    let error = |edge: I::V| HeightError::of_face(isa, edge, left_out);
+    let error = |edge: I::F32x16| HeightError::of_face(isa, edge, left_out);
     let (error_a, error_b) = (error(edge_a), error(edge_b));
     let (normal_a, normal_b) = (repeat(isa, &a.normal), tile(isa, &b.normal));
-    let (mut of_a, mut of_b) = ([Side::default(); 3], [Side::default(); 3]);
+    let (mut of_a, mut of_b) = ([EdgeSide::default(); 3], [EdgeSide::default(); 3]);
     let (mut common, mut once, mut twice) = ([[0; 3]; 3], 0, 0);
     for i in 0..3 {
         for j in 0..3 {
             let between = sub(corners_b[j], corners_a[i]);
             let distance = largest(between);
-            let equal = I::V::bits(distance.le(isa.splat(0.0)));
+            let equal = I::F32x16::bits(distance.le(isa.splat(0.0)));
             common[i][j] = equal;
             of_a[i].common |= equal;
             of_b[j].common |= equal;
@@ -280,7 +280,7 @@ fn beside<I: Isa>(isa: I, a: &SelfPacket, b: &SelfPacket, common: &Common) -> u1
     let (normals_a, normals_b) = (a.edge_normals(isa), b.edge_normals(isa));
     let (edge_a, edge_b) = (isa.repeat(&a.edge), isa.tile(&b.edge));
     let left_out = a.left_out;
-    let error = |edge: I::V| HeightError::of_edge(isa, edge, left_out);
+    let error = |edge: I::F32x16| HeightError::of_edge(isa, edge, left_out);
     let (error_a, error_b) = (error(edge_a), error(edge_b));
     let (mut beside_a, mut beside_b) = ([u16::MAX; 3], [u16::MAX; 3]);
     for i in 0..3 {
@@ -313,7 +313,7 @@ struct HeightError<V> {
 impl<V: Lanes> HeightError<V> {
     /// Over the plane of a face with edges of this size.
     #[inline(always)]
-    fn of_face<I: Isa<V = V>>(isa: I, edge: V, left_out: f32) -> Self {
+    fn of_face<I: Isa<F32x16 = V>>(isa: I, edge: V, left_out: f32) -> Self {
         let wide = edge.add(isa.splat(2.0 * left_out));
         let rounding = wide.mul(wide).mul(isa.splat(50.0 * U));
         let per_distance = wide.mul_add(isa.splat(32.0 * left_out), rounding);
@@ -323,7 +323,7 @@ impl<V: Lanes> HeightError<V> {
 
     /// Over the plane through an edge, perpendicular to a face with edges of this size.
     #[inline(always)]
-    fn of_edge<I: Isa<V = V>>(isa: I, edge: V, left_out: f32) -> Self {
+    fn of_edge<I: Isa<F32x16 = V>>(isa: I, edge: V, left_out: f32) -> Self {
         let wide = edge.add(isa.splat(2.0 * left_out));
         let square = wide.mul(wide);
         let rounding = square.mul(wide.mul(isa.splat(270.0 * U)));
@@ -334,22 +334,27 @@ impl<V: Lanes> HeightError<V> {
 
     /// The distance is that of corners, and that of vertices may be larger.
     #[inline(always)]
-    fn constant<I: Isa<V = V>>(isa: I, per_distance: V, own: V, left_out: f32) -> V {
+    fn constant<I: Isa<F32x16 = V>>(isa: I, per_distance: V, own: V, left_out: f32) -> V {
         per_distance.mul_add(isa.splat(2.0 * left_out), own.add(isa.splat(CUBE_UNDERFLOW)))
     }
 }
 
 /// Returns the lanes of heights that are certainly above 0, and of those certainly below.
 #[inline(always)]
-fn sides<I: Isa>(isa: I, height: I::V, distance: I::V, error: HeightError<I::V>) -> (u16, u16) {
+fn sides<I: Isa>(
+    isa: I,
+    height: I::F32x16,
+    distance: I::F32x16,
+    error: HeightError<I::F32x16>,
+) -> (u16, u16) {
     let error = error.per_distance.mul_add(distance, error.constant);
     let below_error = isa.splat(0.0).sub(error);
-    (I::V::bits(error.lt(height)), I::V::bits(height.lt(below_error)))
+    (I::F32x16::bits(error.lt(height)), I::F32x16::bits(height.lt(below_error)))
 }
 
 /// The lanes in which all corners but the common ones are on one side, and there is one.
 #[inline(always)]
-fn on_one_side([p, q, r]: &[Side; 3]) -> u16 {
+fn on_one_side([p, q, r]: &[EdgeSide; 3]) -> u16 {
     let above = (p.above | p.common) & (q.above | q.common) & (r.above | r.common);
     let below = (p.below | p.common) & (q.below | q.common) & (r.below | r.common);
     (above | below) & !(p.common & q.common & r.common)
@@ -357,7 +362,7 @@ fn on_one_side([p, q, r]: &[Side; 3]) -> u16 {
 
 /// The lanes in which, if only one corner is common, the edges opposite to it do not cross as seen from it.
 #[inline(always)]
-fn turned_away(a: &[Side; 3], b: &[Side; 3]) -> u16 {
+fn turned_away(a: &[EdgeSide; 3], b: &[EdgeSide; 3]) -> u16 {
     let (mut certain, mut first_a, mut second_b) = (u16::MAX, 0, 0);
     for i in 0..3 {
         certain &= a[i].above | a[i].below | a[i].common;

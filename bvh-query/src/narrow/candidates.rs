@@ -57,7 +57,7 @@ pub(super) struct Differences<C> {
 
 impl<C: Corners> Differences<C> {
     #[inline(always)]
-    pub(super) fn new(isa: impl Isa<C = C>, a: &Triangle, b: &Triangle) -> Self {
+    pub(super) fn new(isa: impl Isa<F64x3 = C>, a: &Triangle, b: &Triangle) -> Self {
         let (mut gaps, mut back) = (gaps_from(isa, a, b), gaps_from(isa, b, a));
         let (mut edges_a, mut edges_b) = (edges(isa, a), edges(isa, b));
         let [from_p, from_q, from_r] = gaps;
@@ -78,7 +78,7 @@ impl<C: Corners> Differences<C> {
     /// In order, the rows are: 3 of the corners of `a` with corners, 3 of the edges of `a` with corners, 3 of the edges of `b` with
     /// corners of `a`, 3 of the edges of `a` with edges, and the faces of `a` and of `b` with the corners of the other one.
     #[inline(always)]
-    pub(super) fn closest(&self, isa: impl Isa<C = C>) -> Feet {
+    pub(super) fn closest(&self, isa: impl Isa<F64x3 = C>) -> Feet {
         let (none, one) = (isa.corners([0.0; 3]), isa.corners([1.0; 3]));
         let infinity = isa.corners([f64::INFINITY; 3]);
         let smallest = isa.corners([f64::MIN_POSITIVE; 3]);
@@ -180,7 +180,7 @@ const ROWS: usize = 14;
 
 /// Returns the row, the column and the value of the least number; of equal ones, the first, row by row. None is NaN.
 #[inline(always)]
-fn first_least<C: Corners>(isa: impl Isa<C = C>, rows: &[C; ROWS]) -> (usize, usize, f64) {
+fn first_least<C: Corners>(isa: impl Isa<F64x3 = C>, rows: &[C; ROWS]) -> (usize, usize, f64) {
     // In pairs of neighbours, and not one after another.
     let mut least = *rows;
     let mut number = [isa.corners([0.0; 3]); ROWS];
@@ -212,31 +212,31 @@ pub(super) fn point<C: Corners>(of: &Vectors<C>, corner: usize) -> Point {
 
 /// Returns the same vector for all corners.
 #[inline(always)]
-pub(super) fn everywhere<C: Corners>(isa: impl Isa<C = C>, [x, y, z]: Point) -> Vectors<C> {
+pub(super) fn everywhere<C: Corners>(isa: impl Isa<F64x3 = C>, [x, y, z]: Point) -> Vectors<C> {
     [isa.corners([x; 3]), isa.corners([y; 3]), isa.corners([z; 3])]
 }
 
 /// Returns the corners of a triangle in lanes, from the one called `first` on.
 #[inline(always)]
-pub(super) fn corners<I: Isa>(isa: I, t: &Triangle, first: usize) -> Vectors<I::C> {
+pub(super) fn corners<I: Isa>(isa: I, t: &Triangle, first: usize) -> Vectors<I::F64x3> {
     let (p, q, r) = (t[first % 3], t[(first + 1) % 3], t[(first + 2) % 3]);
     [isa.corners([p[0], q[0], r[0]]), isa.corners([p[1], q[1], r[1]]), isa.corners([p[2], q[2], r[2]])]
 }
 
 /// Returns what leads from a point to the corners of a triangle.
 #[inline(always)]
-fn gaps_to<I: Isa>(isa: I, point: Point, to: &Triangle) -> Vectors<I::C> {
+fn gaps_to<I: Isa>(isa: I, point: Point, to: &Triangle) -> Vectors<I::F64x3> {
     subtract(corners(isa, to, 0), everywhere(isa, point))
 }
 
 #[inline(always)]
-fn gaps_from<I: Isa>(isa: I, [p, q, r]: &Triangle, to: &Triangle) -> [Vectors<I::C>; 3] {
+fn gaps_from<I: Isa>(isa: I, [p, q, r]: &Triangle, to: &Triangle) -> [Vectors<I::F64x3>; 3] {
     [gaps_to(isa, *p, to), gaps_to(isa, *q, to), gaps_to(isa, *r, to)]
 }
 
 /// Returns what leads from each corner of a triangle to the next one.
 #[inline(always)]
-pub(super) fn edges<I: Isa>(isa: I, t: &Triangle) -> Vectors<I::C> {
+pub(super) fn edges<I: Isa>(isa: I, t: &Triangle) -> Vectors<I::F64x3> {
     subtract(corners(isa, t, 1), corners(isa, t, 0))
 }
 
@@ -248,7 +248,7 @@ pub(super) fn magnitude<C: Corners>([x, y, z]: Vectors<C>) -> C {
 
 /// Returns where a weight is strictly between 0 and 1.
 #[inline(always)]
-pub(super) fn is_between<C: Corners>(isa: impl Isa<C = C>, x: C) -> C::Mask {
+pub(super) fn is_between<C: Corners>(isa: impl Isa<F64x3 = C>, x: C) -> C::Mask {
     C::and(isa.corners([0.0; 3]).lt(x), x.lt(isa.corners([1.0; 3])))
 }
 

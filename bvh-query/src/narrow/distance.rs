@@ -218,7 +218,7 @@ impl Link {
 /// scaled to [1, 2). So all underflow together is less than the smallest normal number, and the relative
 /// error of the norm, the division and the last product is less than eight roundings.
 #[inline(always)]
-pub(super) fn certified_gap<I: Isa>(isa: I, direction: Point, gaps: &[Vectors<I::C>]) -> f64 {
+pub(super) fn certified_gap<I: Isa>(isa: I, direction: Point, gaps: &[Vectors<I::F64x3>]) -> f64 {
     let size = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
     // An edge without length leaves no direction.
     if size == 0.0 || !direction.iter().all(|x| x.is_finite()) {

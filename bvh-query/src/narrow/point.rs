@@ -66,17 +66,17 @@ pub(crate) fn point_distance<I: Isa>(isa: I, triangle: &Triangle, point: Point) 
 /// Returns the closest point of the triangle, given what leads to the point from each corner. Ties go to the first of the
 /// corners, then of the edges, then to the face.
 #[inline(always)]
-fn closest_foot<I: Isa>(isa: I, gaps: &Vectors<I::C>, edges: &Vectors<I::C>) -> Foot {
+fn closest_foot<I: Isa>(isa: I, gaps: &Vectors<I::F64x3>, edges: &Vectors<I::F64x3>) -> Foot {
     let (none, one) = (isa.corners([0.0; 3]), isa.corners([1.0; 3]));
     let squares = vectors::dot(*edges, *edges);
     let is_short = squares.lt(isa.corners([f64::MIN_POSITIVE; 3]));
-    let inverse = I::C::select(is_short, none, one.div(squares));
+    let inverse = I::F64x3::select(is_short, none, one.div(squares));
     let along = vectors::dot(*gaps, *edges).mul(inverse);
     let perpendicular = vectors::less(*gaps, along, *edges);
     let inside = vectors::is_between(isa, along);
     let square = vectors::dot(perpendicular, perpendicular);
     let corners = vectors::dot(*gaps, *gaps).all();
-    let sides = I::C::select(inside, square, isa.corners([f64::INFINITY; 3])).all();
+    let sides = I::F64x3::select(inside, square, isa.corners([f64::INFINITY; 3])).all();
     let (mut least, mut foot) = (corners[0], Foot::corner(0));
     for i in 1..3 {
         if corners[i] < least {

@@ -242,7 +242,7 @@ impl<'a> Batch<'a> {
         let share = |_| {
             let mut querier = Querier::with_backend(self.backend);
             querier.set_budget(self.budget);
-            let mut share = Share { answers: Vec::new(), end: None };
+            let mut share = ThreadShare { answers: Vec::new(), end: None };
             while let Some(start) = shared.take(length, poses.len()) {
                 let mut tracker = Tracker::new();
                 for (index, pose) in poses.iter().enumerate().skip(start).take(length) {
@@ -277,7 +277,7 @@ impl<'a> Batch<'a> {
 }
 
 /// What one thread has done.
-struct Share<T, E> {
+struct ThreadShare<T, E> {
     answers: Vec<(usize, T)>,
     end: Option<(usize, E)>,
 }

@@ -12,7 +12,7 @@ use crate::pose::Pose;
 use crate::query::answers::QueryStats;
 use crate::query::bounding_volumes::surely_apart;
 use crate::query::exact::RecentTriangles;
-use crate::query::placed_pair::{Found, PlacedPair, Visit, Walk, each_pair};
+use crate::query::placed_pair::{FoundPair, PlacedPair, VisitPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::node_filter::Measure;
 use crate::traverse::walk::{Order, Visitor};
@@ -48,10 +48,10 @@ impl Querier {
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-    ) -> Result<Option<Found>, QueryError> {
+    ) -> Result<Option<FoundPair>, QueryError> {
         each_pair(a, b, pose, |placed| {
             let pair = self.find_contact(placed)?;
-            Ok(pair.map(|pair| Found { numbers: placed.numbers, pair }))
+            Ok(pair.map(|pair| FoundPair { numbers: placed.numbers, pair }))
         })
     }
 
@@ -105,7 +105,7 @@ pub(super) struct Candidates<'a> {
     pub(super) stats: QueryStats,
     /// Of A and of B.
     pub(super) recent: &'a mut [RecentTriangles; 2],
-    pub(super) visit: Visit<'a>,
+    pub(super) visit: VisitPair<'a>,
     /// What `visit` broke with.
     pub(super) found: Option<TrianglePair>,
 }
@@ -175,7 +175,7 @@ impl Visitor for ContactVisitor<'_> {
             let lane = mask.trailing_zeros() as u8;
             mask &= mask - 1;
             candidates.queue.push(&local, TrianglePair::in_lane(a, b, lane));
-            candidates.queue.last_straddles(planes.overlap >> lane & 1 != 0);
+            candidates.queue.mark_last_straddling(planes.overlap >> lane & 1 != 0);
             if candidates.queue.len() >= candidates.drain_at {
                 candidates.drain_at = TriangleQueue::FULL;
                 if candidates.drain(isa)?.is_break() {

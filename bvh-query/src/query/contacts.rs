@@ -12,7 +12,7 @@ use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
-use crate::query::search::{EachWithin, Finalists, Nearest, Search, ids};
+use crate::query::search::{EachWithin, Finalists, NearestPairs, PairSearch, ids};
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
@@ -137,11 +137,12 @@ impl Querier {
             let tests = self.backend.run(&mut Walk { pair, memory, visitor: &mut visitor })?;
             (tests, visitor.candidates.stats, visitor.candidates.found)
         } else {
-            let (search, bounded) = (&mut Search::new(DistanceOptions::default(), within), &mut self.bounded);
+            let (search, bounded) =
+                (&mut PairSearch::new(DistanceOptions::default(), within), &mut self.bounded);
             let each_within = Some(EachWithin { d: within, visit, found: None });
             let stats = QueryStats::default();
             let finalists = Finalists { placed, direction: None, search, each_within, queue, bounded, stats };
-            let mut visitor = Nearest { packets, finalists };
+            let mut visitor = NearestPairs { packets, finalists };
             let tests = self.backend.run(&mut Walk { pair, memory, visitor: &mut visitor })?;
             let Finalists { stats, each_within, .. } = visitor.finalists;
             (tests, stats, each_within.and_then(|each| each.found))

@@ -10,10 +10,10 @@ use crate::query::answers::{Distance, QueryStats};
 use crate::query::bounding_volumes::sphere_gap;
 use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
-use crate::query::placed_pair::{Found, PlacedPair, Walk, each_pair};
+use crate::query::placed_pair::{FoundPair, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::{limit_of_cores, sum_of_radii};
-use crate::query::search::{Best, Finalists, Nearest, Search, ids};
+use crate::query::search::{BestPair, Finalists, NearestPairs, PairSearch, ids};
 
 impl Querier {
     /// Returns the least distance of the meshes, with B placed by `pose` in A's frame, both closest points and their
@@ -41,7 +41,7 @@ impl Querier {
         b: Shape<'_>,
         pose: &Pose,
     ) -> Result<Distance, QueryError> {
-        let mut search = Search::between_shapes(DistanceOptions::default(), 0.0);
+        let mut search = PairSearch::between_shapes(DistanceOptions::default(), 0.0);
         let best = self.nearest(a, b, pose, &mut search)?.ok_or_else(|| no_answer(a))?;
         Ok(best.distance(search.proved()))
     }
@@ -62,7 +62,7 @@ impl Querier {
         options.check()?;
         let (a, b) = (a.into(), b.into());
         self.start();
-        let mut search = Search::between_shapes(*options, sum_of_radii(a, b));
+        let mut search = PairSearch::between_shapes(*options, sum_of_radii(a, b));
         // Shapes have triangles, and nothing is pruned before a distance is known.
         let best = self.nearest(a, b, pose, &mut search)?.ok_or_else(|| no_answer(a))?;
         self.distance_of_shapes(a, b, pose, best.distance(search.proved()))
@@ -78,7 +78,7 @@ impl Querier {
     ) -> Result<Option<Distance>, QueryError> {
         let (a, b) = (a.into(), b.into());
         self.start();
-        let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
+        let mut search = PairSearch::new(DistanceOptions::default(), f64::INFINITY);
         search.limit_to(limit_of_cores(a, b, limit).next_up());
         let best = self.nearest(a, b, pose, &mut search)?;
         best.map(|best| self.distance_of_shapes(a, b, pose, best.distance(search.proved()))).transpose()
@@ -93,8 +93,8 @@ impl Querier {
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-        search: &mut Search,
-    ) -> Result<Option<Best>, QueryError> {
+        search: &mut PairSearch,
+    ) -> Result<Option<BestPair>, QueryError> {
         self.search(a, b, pose, search)?;
         if let Some(touching) = search.touching {
             return Ok(match self.first_contact(a, b, pose)? {
@@ -135,7 +135,7 @@ impl Querier {
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-        search: &mut Search,
+        search: &mut PairSearch,
     ) -> Result<(), QueryError> {
         each_pair(a, b, pose, |placed| {
             self.memory.budget.visit()?;
@@ -155,7 +155,7 @@ impl Querier {
                 bounded: &mut self.bounded,
                 stats: QueryStats::default(),
             };
-            let mut visitor = Nearest { packets: &mut self.packets, finalists };
+            let mut visitor = NearestPairs { packets: &mut self.packets, finalists };
             let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
             let tests = self.backend.run(task)?;
             let stats = visitor.finalists.stats;
@@ -172,7 +172,7 @@ impl Querier {
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-    ) -> Result<Option<Best>, QueryError> {
+    ) -> Result<Option<BestPair>, QueryError> {
         each_pair(a, b, pose, |placed| {
             let pair = self.find_contact(placed)?;
             pair.map(|pair| self.contact(placed, pair)).transpose()
@@ -180,11 +180,11 @@ impl Querier {
     }
 
     /// Returns the answer that names a pair of triangles in contact.
-    fn contact(&self, placed: &PlacedPair<'_>, pair: TrianglePair) -> Result<Best, QueryError> {
+    fn contact(&self, placed: &PlacedPair<'_>, pair: TrianglePair) -> Result<BestPair, QueryError> {
         let triangle_a = placed.triangle_a(pair.a, pair.lane_a)?;
         let triangle_b = placed.triangle_b(pair.b, pair.lane_b)?;
         let closest = self.backend.run(TriangleDistance(&triangle_a, &triangle_b));
-        Ok(Best { closest, found: Found { numbers: placed.numbers, pair }, ids: ids(placed, &pair)? })
+        Ok(BestPair { closest, found: FoundPair { numbers: placed.numbers, pair }, ids: ids(placed, &pair)? })
     }
 }
 

@@ -95,11 +95,12 @@ impl PlacedPair<'_> {
 }
 
 /// What is done with a pair of triangles in contact. A reference, so that one walk is compiled for all of them.
-pub(super) type Visit<'a> = &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
+pub(super) type VisitPair<'a> =
+    &'a mut dyn FnMut(TrianglePair) -> Result<ControlFlow<TrianglePair>, QueryError>;
 
 /// A pair of triangles that a query has found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(super) struct FoundPair {
     /// The numbers that the objects have in their files.
     pub(super) numbers: (u32, u32),
     pub(super) pair: TrianglePair,

@@ -11,7 +11,7 @@ use crate::query::answers::Distance;
 use crate::query::options::DistanceOptions;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::querier::Querier;
-use crate::query::search::Search;
+use crate::query::search::PairSearch;
 
 /// Returns how far apart two cores may be for the shapes to touch.
 pub(crate) fn sum_of_radii(a: Shape<'_>, b: Shape<'_>) -> f64 {
@@ -47,7 +47,7 @@ impl Querier {
         if d == 0.0 {
             return Ok(self.any_contact(a, b, pose)?.is_some());
         }
-        let mut search = Search::new(DistanceOptions::default(), d);
+        let mut search = PairSearch::new(DistanceOptions::default(), d);
         self.search(a, b, pose, &mut search)?;
         Ok(search.done)
     }

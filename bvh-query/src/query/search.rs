@@ -17,7 +17,7 @@ use crate::numerics::{SLACK, round_up};
 use crate::query::answers::{Distance, QueryStats};
 use crate::query::exact::TriangleDistance;
 use crate::query::options::DistanceOptions;
-use crate::query::placed_pair::{Found, PlacedPair, Visit};
+use crate::query::placed_pair::{FoundPair, PlacedPair, VisitPair};
 use crate::traverse::node_filter::Measure;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
@@ -37,9 +37,9 @@ pub(crate) struct BoundedPair {
 
 /// The closest pair so far.
 #[derive(Clone, Copy)]
-pub(super) struct Best {
+pub(super) struct BestPair {
     pub(super) closest: Closest,
-    pub(super) found: Found,
+    pub(super) found: FoundPair,
     /// The ids of both triangles.
     pub(super) ids: (u32, u32),
 }
@@ -50,8 +50,8 @@ pub(super) fn ids(placed: &PlacedPair<'_>, pair: &TrianglePair) -> Result<(u32, 
     Ok((placed.pair.bvh_a.triangle_id(a, pair.place_a())?, placed.pair.bvh_b.triangle_id(b, pair.place_b())?))
 }
 
-impl Best {
-    /// Returns the pair as an answer, given `Search::proved`.
+impl BestPair {
+    /// Returns the pair as an answer, given `PairSearch::proved`.
     pub(super) fn distance(&self, proved: f64) -> Distance {
         let lower = if self.closest.distance == 0.0 { 0.0 } else { proved };
         let (object_a, object_b) = self.found.numbers;
@@ -70,15 +70,15 @@ impl Best {
 }
 
 /// What is known of the distance so far, over all pairs of objects.
-pub(super) struct Search {
+pub(super) struct PairSearch {
     options: DistanceOptions,
     /// The errors that the options allow are of the distance beyond this one, the sum of radii.
     beyond: f64,
     /// The question of `within`: stop at the first pair at most this far apart.
     enough: Option<f64>,
-    pub(super) best: Option<Best>,
+    pub(super) best: Option<BestPair>,
     /// A pair in contact, which ends the search. Which one it is depends on the backend.
-    pub(super) touching: Option<Found>,
+    pub(super) touching: Option<FoundPair>,
     /// The least certified lower bound of the pairs settled.
     settled_lower: f64,
     /// No pair is farther apart than this: f32, rounded up.
@@ -91,7 +91,7 @@ pub(super) struct Search {
     order: Order,
 }
 
-impl Search {
+impl PairSearch {
     /// Starts a search that stops at the first pair at most `enough` apart, or that looks for the closest pair if `enough`
     /// is infinite.
     pub(super) fn new(options: DistanceOptions, enough: f64) -> Self {
@@ -142,7 +142,7 @@ impl Search {
     }
 
     /// Returns the pair in contact, or the closest one so far.
-    pub(super) fn found(&self) -> Option<Found> {
+    pub(super) fn found(&self) -> Option<FoundPair> {
         self.touching.or(self.best.map(|best| best.found))
     }
 
@@ -180,7 +180,7 @@ impl Search {
     ) -> Result<(), QueryError> {
         let triangle_a = placed.triangle_a(pair.a, pair.lane_a)?;
         let triangle_b = placed.triangle_b(pair.b, pair.lane_b)?;
-        let found = Found { numbers: placed.numbers, pair };
+        let found = FoundPair { numbers: placed.numbers, pair };
         // Most pairs without a gap touch, and a touching pair needs no distance.
         if may_touch && triangles_intersect(&triangle_a, &triangle_b) {
             (self.touching, self.done) = (Some(found), true);
@@ -197,7 +197,7 @@ impl Search {
             Some(best) => closest.distance < best.closest.distance,
         };
         if nearer {
-            self.best = Some(Best { closest, found, ids: ids(placed, &pair)? });
+            self.best = Some(BestPair { closest, found, ids: ids(placed, &pair)? });
         }
         self.lower_upper(with_slack(closest.upper));
         self.done |= match self.enough {
@@ -222,7 +222,7 @@ fn within_unit(direction: [f64; 3]) -> Option<[f32; 3]> {
 }
 
 /// Collects pairs of triangles that may be the closest.
-pub(super) struct Nearest<'a> {
+pub(super) struct NearestPairs<'a> {
     /// Of A and of B.
     pub(super) packets: &'a mut [PlacedPackets; 2],
     pub(super) finalists: Finalists<'a>,
@@ -231,7 +231,7 @@ pub(super) struct Nearest<'a> {
 /// The question for all pairs of triangles within a distance: the contacts of rounded shapes.
 pub(super) struct EachWithin<'a> {
     pub(super) d: f64,
-    pub(super) visit: Visit<'a>,
+    pub(super) visit: VisitPair<'a>,
     /// What `visit` broke with.
     pub(super) found: Option<TrianglePair>,
 }
@@ -239,7 +239,7 @@ pub(super) struct EachWithin<'a> {
 /// Bounds pairs of triangles and measures those that still may be the closest.
 pub(super) struct Finalists<'a> {
     pub(super) placed: &'a PlacedPair<'a>,
-    pub(super) search: &'a mut Search,
+    pub(super) search: &'a mut PairSearch,
     /// With it, the limit stays as it is, and each pair is decided.
     pub(super) each_within: Option<EachWithin<'a>>,
     pub(super) queue: &'a mut TriangleQueue,
@@ -342,10 +342,10 @@ impl Finalists<'_> {
     }
 }
 
-impl Visitor for Nearest<'_> {
+impl Visitor for NearestPairs<'_> {
     const MEASURE: Measure = Measure::Distance;
     const MAY_BE_BEST_FIRST: bool = true;
-    const HAS_WITNESS: bool = true;
+    const HAS_SEPARATING_DIRECTION: bool = true;
 
     fn order(&self) -> Order {
         // Other orders may visit a pair of leaves twice, and each pair is told of once.
@@ -358,7 +358,7 @@ impl Visitor for Nearest<'_> {
     }
 
     #[inline(always)]
-    fn witness(&self) -> Option<[f32; 3]> {
+    fn separating_direction(&self) -> Option<[f32; 3]> {
         self.finalists.direction
     }
 

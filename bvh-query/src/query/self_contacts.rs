@@ -77,7 +77,8 @@ impl Querier {
         if reports.duplicates(tree, budget)?.is_break() {
             return Ok(reports.calls);
         }
-        let visit: Visit<'_> = &mut |places, kind, budget| reports.pair(tree, places, kind, budget);
+        let visit: VisitSelfContact<'_> =
+            &mut |places, kind, budget| reports.pair(tree, places, kind, budget);
         let (recent, stats) = (Default::default(), QueryStats::default());
         let exact = ExactPairs { shape, tree, recent, stats, visit };
         let mut visitor =
@@ -143,7 +144,7 @@ impl Task for VisitPairs<'_, '_> {
 }
 
 /// What is done with two stored triangles in contact: each by the number of its packet and its place there.
-type Visit<'a> =
+type VisitSelfContact<'a> =
     &'a mut dyn FnMut([(u32, u8); 2], SelfContactKind, &mut Budget) -> Result<ControlFlow<()>, QueryError>;
 
 /// Decides which triangles of two packets are in contact.
@@ -248,7 +249,7 @@ struct ExactPairs<'a> {
     /// Of both sides of a pair.
     recent: [RecentTriangles; 2],
     stats: QueryStats,
-    visit: Visit<'a>,
+    visit: VisitSelfContact<'a>,
 }
 
 impl ExactPairs<'_> {

@@ -5,7 +5,7 @@
 //! - *A pair of triangles*, the last that was closest, near or in contact. In any pose, it is one of the pairs that the
 //!   question is about. If it meets in the new pose, so do the meshes. Otherwise its distance in the new pose is
 //!   measured in f64, and the certified upper bound limits the walk before it begins. The direction between its closest
-//!   points is the first witness direction. The pair itself is not an answer: the walk prunes strictly beyond the
+//!   points is the first separating direction. The pair itself is not an answer: the walk prunes strictly beyond the
 //!   limit, meets this pair or a nearer one, and decides as always.
 //! - *Bounds* of the distance in an earlier pose, which are certified. No vertex of B moves farther than
 //!   [`displacement`] from that pose to a new one, so the distance changes by no more. If the bounds decide the
@@ -28,10 +28,10 @@ use crate::query::displacement::{displacement, size};
 use crate::query::distance::no_answer;
 use crate::query::exact::{TriangleDistance, placed, stored};
 use crate::query::options::{DistanceOptions, check_distance};
-use crate::query::placed_pair::Found;
+use crate::query::placed_pair::FoundPair;
 use crate::query::querier::Querier;
 use crate::query::rounded::limit_of_cores;
-use crate::query::search::Search;
+use crate::query::search::PairSearch;
 
 /// Reuses the last answers about two meshes, so that an answer about a nearby pose costs less.
 ///
@@ -65,7 +65,7 @@ use crate::query::search::Search;
 pub struct Tracker {
     /// What the last question was about.
     last: Option<Asked>,
-    pair: Option<Found>,
+    pair: Option<FoundPair>,
     bounds: Option<DistanceBounds>,
     /// How many questions to let pass before looking ahead again.
     wait: u32,
@@ -156,7 +156,7 @@ impl Tracker {
         querier.start();
         querier.look_at_objects(b)?;
         let moved = self.turn_to(a, b, pose);
-        let search = || Search::new(DistanceOptions::default(), f64::INFINITY);
+        let search = || PairSearch::new(DistanceOptions::default(), f64::INFINITY);
         let (mut limited, mut found) = (search(), None);
         if let Some((triangle_a, triangle_b)) = self.triangles(querier, a, b, pose) {
             let closest = querier.backend.run(TriangleDistance(&triangle_a, &triangle_b));
@@ -219,7 +219,7 @@ impl Tracker {
             Some((_, upper)) if upper <= d => return Ok(true),
             _ => {}
         }
-        let mut search = Search::new(DistanceOptions::default(), d);
+        let mut search = PairSearch::new(DistanceOptions::default(), d);
         if let Some((triangle_a, triangle_b)) = self.triangles(querier, a, b, pose) {
             let closest = querier.backend.run(TriangleDistance(&triangle_a, &triangle_b));
             if triangles_within(&triangle_a, &triangle_b, &closest, d) {
@@ -265,7 +265,7 @@ impl Tracker {
         b: Shape<'_>,
         pose: &Pose,
     ) -> Option<(Triangle, Triangle)> {
-        let Found { numbers, pair } = self.pair?;
+        let FoundPair { numbers, pair } = self.pair?;
         let (object_a, object_b) = (a.numbered(numbers.0)?, b.numbered(numbers.1)?);
         let triangle_a = stored(a.bvh(), object_a, pair.a, pair.lane_a).ok()?;
         let triangle_b = stored(b.bvh(), object_b, pair.b, pair.lane_b).ok()?;
@@ -290,7 +290,7 @@ impl Tracker {
             return;
         }
         let room = beyond + LOOK_AHEAD_MOTIONS * moved;
-        let mut search = Search::new(DistanceOptions::default(), room);
+        let mut search = PairSearch::new(DistanceOptions::default(), room);
         let budget = querier.memory.budget;
         querier.memory.budget.allow_as_much_again();
         let found = querier.search(a, b, pose, &mut search);

@@ -67,7 +67,7 @@ struct Encounter {
 }
 
 /// Called with pairs to ask about, until it breaks. Through a reference, because each copy of the search takes 5 KB.
-type Visit<'a> = dyn FnMut(&[Encounter]) -> Result<ControlFlow<()>, SceneError> + 'a;
+type VisitEncounters<'a> = dyn FnMut(&[Encounter]) -> Result<ControlFlow<()>, SceneError> + 'a;
 
 /// A moving instance, and where it is during each slice.
 struct Moving<'a> {
@@ -87,7 +87,7 @@ impl Moving<'_> {
 }
 
 /// The path of a moving instance.
-struct Way<'a> {
+struct BodyTrack<'a> {
     place: u32,
     /// The place of the instance that the path was given for: its own, or that of one above it.
     given: u32,
@@ -95,8 +95,8 @@ struct Way<'a> {
 }
 
 /// The paths in question, and their numbers by the places of their instances.
-struct Ways<'a> {
-    ways: Vec<Way<'a>>,
+struct BodyTracks<'a> {
+    tracks: Vec<BodyTrack<'a>>,
     numbers: Table,
     options: &'a MotionOptions,
 }
@@ -129,11 +129,11 @@ impl Scene {
         paths: &[(InstanceId, WorldPath<'_>)],
         options: &MotionOptions,
     ) -> Result<SceneMotionAnswer, SceneError> {
-        let ways = self.ways(paths, options)?;
+        let tracks = self.tracks(paths, options)?;
         let earliest = Earliest::new();
         let mut together = Together::default();
         self.each_way(
-            &ways,
+            &tracks,
             |querier, pair, a, b, path| {
                 let answer = querier.motion_before(a, b, path, options, &earliest);
                 Ok((!matches!(answer, Ok(MotionAnswer::Free))).then_some((pair, answer)))
@@ -160,11 +160,11 @@ impl Scene {
         paths: &[(InstanceId, WorldPath<'_>)],
         options: &MotionOptions,
     ) -> Result<bool, SceneError> {
-        let ways = self.ways(paths, options)?;
+        let tracks = self.tracks(paths, options)?;
         let is_hit = AtomicBool::new(false);
         let mut first_error = None;
         self.each_way(
-            &ways,
+            &tracks,
             |querier, pair, a, b, path| {
                 if is_hit.load(Ordering::Relaxed) {
                     return Ok(None);
@@ -195,55 +195,59 @@ impl Scene {
     }
 
     /// Checks what is given.
-    fn ways<'a>(
+    fn tracks<'a>(
         &mut self,
         paths: &[(InstanceId, WorldPath<'a>)],
         options: &'a MotionOptions,
-    ) -> Result<Ways<'a>, SceneError> {
+    ) -> Result<BodyTracks<'a>, SceneError> {
         options.check()?;
         for &(id, path) in paths {
             self.contents.check_pose(id, &path.pose(0.0))?;
             self.contents.check_pose(id, &path.pose(1.0))?;
         }
         let mut numbers = Table::new(self.contents.instances.len());
-        let mut ways: Vec<Way<'_>> = Vec::new();
+        let mut tracks: Vec<BodyTrack<'_>> = Vec::new();
         for &(id, path) in paths {
-            let way = Way { place: id.place, given: id.place, path: AttachedPath::new(path) };
+            let way = BodyTrack { place: id.place, given: id.place, path: AttachedPath::new(path) };
             match numbers.get(id.place) {
-                Some(number) => ways[number] = way,
+                Some(number) => tracks[number] = way,
                 None => {
-                    numbers.set(id.place, ways.len());
-                    ways.push(way);
+                    numbers.set(id.place, tracks.len());
+                    tracks.push(way);
                 }
             }
         }
         // What is attached follows, unless it has a path of its own. The list grows on the way.
         let mut next = 0;
-        while let Some(&Way { place, given, .. }) = ways.get(next) {
+        while let Some(&BodyTrack { place, given, .. }) = tracks.get(next) {
             for &child in self.contents.at(place).iter().flat_map(|instance| &instance.children) {
                 let (Some(attached), Some(id)) = (self.contents.attached(child), self.contents.id_at(child))
                 else {
                     continue;
                 };
                 if numbers.get(child).is_none() {
-                    let path = ways[next].path.of_child(attached.kept);
+                    let path = tracks[next].path.of_child(attached.kept);
                     self.contents.check_pose(id, &path.pose(0.0))?;
                     self.contents.check_pose(id, &path.pose(1.0))?;
-                    numbers.set(child, ways.len());
-                    ways.push(Way { place: child, given, path });
+                    numbers.set(child, tracks.len());
+                    tracks.push(BodyTrack { place: child, given, path });
                 }
             }
             next += 1;
         }
         self.start();
-        Ok(Ways { ways, numbers, options })
+        Ok(BodyTracks { tracks, numbers, options })
     }
 
     /// Calls `visit` with the pairs that may come within the clearance, until `visit` breaks: in several calls if there
     /// are many. The pairs of a call are in the order in which their boxes come near each other.
-    fn each_piece_of_encounters(&self, ways: &Ways<'_>, visit: &mut Visit<'_>) -> Result<(), SceneError> {
+    fn each_piece_of_encounters(
+        &self,
+        tracks: &BodyTracks<'_>,
+        visit: &mut VisitEncounters<'_>,
+    ) -> Result<(), SceneError> {
         let all = |slices: usize| -> Vec<Moving<'_>> {
-            ways.ways.iter().map(|way| self.moving(way.place, &way.path, slices)).collect()
+            tracks.tracks.iter().map(|way| self.moving(way.place, &way.path, slices)).collect()
         };
         let mut moving = all(1);
         let slices = moving.iter().map(Moving::slices_worthwhile).max().unwrap_or(1);
@@ -255,23 +259,23 @@ impl Scene {
             let whole = one.slices.iter().fold(WorldBox::EMPTY, |whole, slice| whole.union(slice));
             let mut near = Vec::new();
             let limit =
-                |other: &WorldBox| ways.limit_by_boxes(&whole, other) + self.contents.reach_of_pairs();
+                |other: &WorldBox| tracks.limit_by_boxes(&whole, other) + self.contents.reach_of_pairs();
             self.charged(|budget| {
                 budget.charge((moving.len() - number) as u64)?;
                 self.contents
                     .broad
                     .near(&whole, one.instance.groups, limit, budget, |place, _| near.push(place))
             })?;
-            for place in near.into_iter().filter(|place| ways.of(*place).is_none()) {
+            for place in near.into_iter().filter(|place| tracks.of(*place).is_none()) {
                 let other = self.contents.known(place);
                 let still = vec![other.bounds; slices];
                 let pair = [(place, other, still.as_slice()), (one.place, one.instance, &one.slices)];
-                encounters.extend(self.encounter(pair, ways));
+                encounters.extend(self.encounter(pair, tracks));
             }
             for other in &moving[number + 1..] {
                 let (a, b) = if one.place < other.place { (one, other) } else { (other, one) };
                 let pair = [a, b].map(|of| (of.place, of.instance, of.slices.as_slice()));
-                encounters.extend(self.encounter(pair, ways));
+                encounters.extend(self.encounter(pair, tracks));
             }
             if encounters.len() >= MAX_KNOWN_PAIRS || number + 1 == moving.len() {
                 encounters.sort_unstable_by_key(|encounter| (encounter.slice, encounter.a, encounter.b));
@@ -303,15 +307,15 @@ impl Scene {
     fn encounter(
         &self,
         [(a, one, slices), (b, other, others)]: [(u32, &Instance, &[WorldBox]); 2],
-        ways: &Ways<'_>,
+        tracks: &BodyTracks<'_>,
     ) -> Option<Encounter> {
         if !one.groups.meet(other.groups) || one.allows(b) {
             return None;
         }
         let margin = self.contents.margin_of_pair(a, b);
         let default = || default_tolerance(one.measures_with(margin), other.measures_with(0.0));
-        let tolerance = ways.options.tolerance.unwrap_or_else(default);
-        let limit = (ways.options.clearance + tolerance + reach_of(margin)).powi(2);
+        let tolerance = tracks.options.tolerance.unwrap_or_else(default);
+        let limit = (tracks.options.clearance + tolerance + reach_of(margin)).powi(2);
         let is_near = |(one, other): (&WorldBox, &WorldBox)| one.squared_gap(other) <= limit;
         let slice = slices.iter().zip(others).position(is_near);
         slice.map(|slice| Encounter { slice, a, b })
@@ -321,7 +325,7 @@ impl Scene {
     /// breaks.
     fn each_way<R: Send>(
         &mut self,
-        ways: &Ways<'_>,
+        tracks: &BodyTracks<'_>,
         ask: impl Fn(
             &mut Querier,
             ScenePair,
@@ -334,12 +338,12 @@ impl Scene {
     ) -> Result<(), SceneError> {
         let (mut stats, mut pairs_asked) = (self.stats, 0);
         let scene = &*self;
-        let asked = scene.each_piece_of_encounters(ways, &mut |encounters| {
+        let asked = scene.each_piece_of_encounters(tracks, &mut |encounters| {
             pairs_asked += encounters.len() as u64;
             let found = scene.workers.each(encounters, &mut stats, |querier, &Encounter { a, b, .. }| {
                 let (one, other) = (scene.contents.known(a), scene.contents.known(b));
-                let relative = RelativePath::new(ways.path(a, one), ways.path(b, other));
-                let together = ways.together(a, b);
+                let relative = RelativePath::new(tracks.path(a, one), tracks.path(b, other));
+                let together = tracks.together(a, b);
                 let path: &dyn RigidPath = together.as_ref().map_or(&relative, |together| together);
                 let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
                 let pair = ScenePair { a: one.id(a), b: other.id(b) };
@@ -357,10 +361,10 @@ impl Scene {
     }
 }
 
-impl<'a> Ways<'a> {
+impl<'a> BodyTracks<'a> {
     /// Returns the path of an instance, if it moves.
-    fn of(&self, place: u32) -> Option<&Way<'a>> {
-        self.numbers.get(place).map(|number| &self.ways[number])
+    fn of(&self, place: u32) -> Option<&BodyTrack<'a>> {
+        self.numbers.get(place).map(|number| &self.tracks[number])
     }
 
     /// Returns the path of an instance, which may be its pose.

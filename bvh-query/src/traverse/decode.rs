@@ -33,7 +33,7 @@ enum Unit<V> {
 
 impl<V: Lanes> Unit<V> {
     #[inline(always)]
-    fn of<I: Isa<V = V>>(self, isa: I, parent_lo: V, parent_hi: V) -> V {
+    fn of<I: Isa<F32x16 = V>>(self, isa: I, parent_lo: V, parent_hi: V) -> V {
         match self {
             Self::Step(step) => isa.round_step_up(parent_hi.sub(parent_lo).mul(step)),
             Self::Fixed(scale) => scale,
@@ -53,7 +53,7 @@ pub(crate) enum Parent<'a> {
 impl Parent<'_> {
     /// Returns four rows of lower ends and of upper ends, each repeated for four children.
     #[inline(always)]
-    pub(super) fn ends<I: Isa>(self, isa: I, q: usize) -> (I::V, I::V) {
+    pub(super) fn ends<I: Isa>(self, isa: I, q: usize) -> (I::F32x16, I::F32x16) {
         match self {
             Self::Node(group, column) => {
                 let (lo, hi) = (isa.load(&group.lo[q]), isa.load(&group.hi[q]));

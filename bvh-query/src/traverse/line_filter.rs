@@ -75,7 +75,7 @@ impl LineFilter {
 
     /// Returns where the segment enters four nodes, from 0 to 1; infinity where it does not.
     #[inline(always)]
-    pub(crate) fn entries<I: Isa>(&self, isa: I, nodes: &Group) -> I::H {
+    pub(crate) fn entries<I: Isa>(&self, isa: I, nodes: &Group) -> I::F32x4 {
         match self.set {
             DirectionSet::Dop6 => self.entries_in::<I, 1>(isa, nodes),
             DirectionSet::Dop14 => self.entries_in::<I, 2>(isa, nodes),
@@ -84,7 +84,7 @@ impl LineFilter {
     }
 
     #[inline(always)]
-    fn entries_in<I: Isa, const QUADS: usize>(&self, isa: I, nodes: &Group) -> I::H {
+    fn entries_in<I: Isa, const QUADS: usize>(&self, isa: I, nodes: &Group) -> I::F32x4 {
         /// 8u.
         const SLACK: f32 = 1.0 / (1 << 21) as f32;
         let (mut entry, mut exit) = (isa.splat(0.0), isa.splat(1.0));
@@ -103,6 +103,6 @@ impl LineFilter {
         let ([a, b, c, d], [e, f, g, h]) = (quads(isa, &entries), quads(isa, &exits));
         let entry = a.max(b).max(c.max(d)).mul(isa.splat4(1.0 - SLACK));
         let exit = e.min(f).min(g.min(h)).mul(isa.splat4(1.0 + SLACK));
-        I::H::select(entry.le(exit), entry, isa.splat4(f32::INFINITY))
+        I::F32x4::select(entry.le(exit), entry, isa.splat4(f32::INFINITY))
     }
 }

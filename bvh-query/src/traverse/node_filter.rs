@@ -81,7 +81,7 @@ impl Ways {
 
 /// A direction in A's frame along which one more pair of slab ends is compared.
 #[derive(Clone, Copy)]
-pub(crate) struct Witness {
+pub(crate) struct SeparatingDirection {
     direction: [f32; 3],
     /// The upper end of a node of A.
     form_a: Form,
@@ -156,18 +156,22 @@ impl NodeFilter {
         self.ways = Ways::along(direction);
     }
 
-    /// Adopts a new witness direction.
+    /// Adopts a new separating direction.
     #[inline(always)]
-    pub(crate) fn update_witness(&self, witness: &mut Option<Witness>, direction: Option<[f32; 3]>) {
+    pub(crate) fn update_separating(
+        &self,
+        separating: &mut Option<SeparatingDirection>,
+        direction: Option<[f32; 3]>,
+    ) {
         if let Some(direction) = direction
-            && witness.is_none_or(|held| held.direction != direction)
+            && separating.is_none_or(|held| held.direction != direction)
         {
-            *witness = Some(self.witness(direction));
+            *separating = Some(self.separating_direction(direction));
         }
     }
 
     /// `direction` is at most of length 1.
-    fn witness(&self, direction: [f32; 3]) -> Witness {
+    fn separating_direction(&self, direction: [f32; 3]) -> SeparatingDirection {
         let d = direction.map(f64::from);
         let form_a = upper_form(d, self.set_a);
         let form_b = upper_form(self.placement.seen_from_b(d), self.set_b).mirrored();
@@ -176,7 +180,7 @@ impl NodeFilter {
         let error = form_error(form_a.coefficients, self.reach_a.ends, 0.0)
             + form_error(form_b.coefficients, self.reach_b.ends, offset)
             + 3.0 * self.placement.error;
-        Witness { direction, form_a, form_b, offset: (offset - error) as f32 }
+        SeparatingDirection { direction, form_a, form_b, offset: (offset - error) as f32 }
     }
 
     /// Returns bounds on the slab ends of A's nodes and of B's.
@@ -242,16 +246,16 @@ impl NodeFilter {
         isa: I,
         measure: Measure,
         (group_a, group_b, aligned_b): (&Group, &Group, &Group),
-        witness: &Option<Witness>,
+        separating: &Option<SeparatingDirection>,
         limit: f32,
         bounds: &mut [f32; 16],
     ) -> u16 {
         let mut gaps = gaps_along(isa, measure, self.set_a, (group_a, aligned_b));
-        if let Some(witness) = witness {
-            gaps = gaps.max(witness.gaps(isa, group_a, group_b));
+        if let Some(separating) = separating {
+            gaps = gaps.max(separating.gaps(isa, group_a, group_b));
         }
         isa.store(gaps, bounds);
-        I::V::bits(gaps.le(isa.splat(limit)))
+        I::F32x16::bits(gaps.le(isa.splat(limit)))
     }
 
     /// Tests the same pairs along B's directions: raises the bounds that `run` has found.
@@ -266,13 +270,13 @@ impl NodeFilter {
     ) -> u16 {
         let gaps = gaps_along(isa, measure, self.set_b, (aligned_a, group_b));
         if measure != Measure::Distance {
-            return I::V::bits(gaps.le(isa.splat(limit)));
+            return I::F32x16::bits(gaps.le(isa.splat(limit)));
         }
         // Seen from A, B's directions are longer or shorter by at most 2^-19, all together: so far a rotation
         // may be off.
         let gaps = gaps.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32)).max(isa.load(bounds));
         isa.store(gaps, bounds);
-        I::V::bits(gaps.le(isa.splat(limit)))
+        I::F32x16::bits(gaps.le(isa.splat(limit)))
     }
 }
 
@@ -293,13 +297,13 @@ impl NodeFilter {
             leaving = leaving.max_of_numbers(up.mul_add(isa.splat(self.ways.up[slab]), way));
         }
         isa.store(leaving, bounds);
-        I::V::bits(leaving.le(isa.splat(limit)))
+        I::F32x16::bits(leaving.le(isa.splat(limit)))
     }
 }
 
-impl Witness {
+impl SeparatingDirection {
     #[inline(always)]
-    fn gaps<I: Isa>(&self, isa: I, group_a: &Group, group_b: &Group) -> I::V {
+    fn gaps<I: Isa>(&self, isa: I, group_a: &Group, group_b: &Group) -> I::F32x16 {
         let (mut upper_a, mut lower_b) = ([0.0; 4], [0.0; 4]);
         isa.store4(evaluate(isa, &self.form_a, group_a, isa.splat4(0.0)), &mut upper_a);
         isa.store4(evaluate(isa, &self.form_b, group_b, isa.splat4(self.offset)), &mut lower_b);
@@ -309,7 +313,7 @@ impl Witness {
 
 /// Evaluates a form over the rows of a group, and adds an offset.
 #[inline(always)]
-fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
+fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::F32x4) -> I::F32x4 {
     let rows = group.rows();
     let mut sum = offset;
     for j in 0..3 {
@@ -321,14 +325,14 @@ fn evaluate<I: Isa>(isa: I, form: &Form, group: &Group, offset: I::H) -> I::H {
 
 /// Returns the signed gap of each of 16 pairs, four nodes of A and four of B, along one direction of both groups.
 #[inline(always)]
-fn gap<I: Isa>(isa: I, ends: (&Group, &Group), slab: usize) -> I::V {
+fn gap<I: Isa>(isa: I, ends: (&Group, &Group), slab: usize) -> I::F32x16 {
     let (up, down) = gaps_of_ends(isa, ends, slab);
     down.max_of_numbers(up)
 }
 
 /// Returns how far B is above A, and below it.
 #[inline(always)]
-fn gaps_of_ends<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> (I::V, I::V) {
+fn gaps_of_ends<I: Isa>(isa: I, (group_a, group_b): (&Group, &Group), slab: usize) -> (I::F32x16, I::F32x16) {
     let (rows_a, rows_b) = (group_a.rows(), group_b.rows());
     let (lo_a, hi_a) = (isa.repeat(&rows_a[row(slab)]), isa.repeat(&rows_a[16 + row(slab)]));
     let (lo_b, hi_b) = (isa.tile(&rows_b[row(slab)]), isa.tile(&rows_b[16 + row(slab)]));
@@ -343,7 +347,7 @@ pub(crate) fn gaps_along<I: Isa>(
     measure: Measure,
     set: DirectionSet,
     ends: (&Group, &Group),
-) -> I::V {
+) -> I::F32x16 {
     match set {
         DirectionSet::Dop6 => gaps::<I, 3>(isa, measure, ends),
         DirectionSet::Dop14 => gaps::<I, 7>(isa, measure, ends),
@@ -354,7 +358,7 @@ pub(crate) fn gaps_along<I: Isa>(
 /// Returns the gap of each of 16 pairs: for `Overlap` the largest signed gap along any direction, for
 /// `Distance` a lower bound of the distance.
 #[inline(always)]
-fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Group)) -> I::V {
+fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Group)) -> I::F32x16 {
     // Three maxima side by side, so that none waits for the one before.
     let [mut x, mut y, mut z] = [gap(isa, ends, 0), gap(isa, ends, 1), gap(isa, ends, 2)];
     if measure != Measure::Distance {
@@ -399,7 +403,7 @@ fn gaps<I: Isa, const SLABS: usize>(isa: I, measure: Measure, ends: (&Group, &Gr
     // Products with subnormal results may round up, but not past a limit, which is an f32 itself: one that
     // the exact product does not exceed is not exceeded by the nearest f32 either.
     let normal = isa.splat(f32::MIN_POSITIVE).le(sum);
-    let apart = I::V::select(normal, sum.sqrt(), largest);
-    let apart = I::V::select(sum.le(isa.splat(f32::MAX)), apart, largest);
+    let apart = I::F32x16::select(normal, sum.sqrt(), largest);
+    let apart = I::F32x16::select(sum.le(isa.splat(f32::MAX)), apart, largest);
     largest.max(apart).mul(isa.splat(1.0 - F32_SLACK))
 }

@@ -87,7 +87,7 @@ fn is_nested<I: Isa>(
         let (lo, hi) = Parent::Node(group, column).ends(isa, q);
         let (anchor_lo, anchor_hi) = Parent::Anchor(anchor).ends(isa, q);
         // False for NaN, which a forged file may decode to.
-        beyond |= !(I::V::bits(lo.le(anchor_lo)) & I::V::bits(anchor_hi.le(hi))) & rows;
+        beyond |= !(I::F32x16::bits(lo.le(anchor_lo)) & I::F32x16::bits(anchor_hi.le(hi))) & rows;
     }
     beyond == 0
 }

@@ -38,7 +38,7 @@ impl Boxes {
         for axis in 0..3 {
             let below = isa.repeat(&self.lo[axis]).le(isa.tile(&other.hi[axis]));
             let above = isa.tile(&other.lo[axis]).le(isa.repeat(&self.hi[axis]));
-            mask &= I::V::bits(below) & I::V::bits(above);
+            mask &= I::F32x16::bits(below) & I::F32x16::bits(above);
         }
         mask
     }

@@ -55,7 +55,7 @@ impl PointFilter {
     /// Returns lower bounds of the distances of four nodes, in units of the test. Where the point is in all slabs of a node,
     /// the bound is negative, and tells how deep.
     #[inline(always)]
-    pub(crate) fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
+    pub(crate) fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::F32x4 {
         match self.set {
             DirectionSet::Dop6 => self.bounds_in::<I, 1>(isa, children),
             DirectionSet::Dop14 => self.bounds_in::<I, 2>(isa, children),
@@ -64,7 +64,7 @@ impl PointFilter {
     }
 
     #[inline(always)]
-    fn bounds_in<I: Isa, const QUADS: usize>(&self, isa: I, children: &Group) -> I::H {
+    fn bounds_in<I: Isa, const QUADS: usize>(&self, isa: I, children: &Group) -> I::F32x4 {
         let axes = self.gaps(isa, children, 0);
         // `max` returns its second operand for NaN, which rows without a slab may have: these come first.
         let mut largest = axes;
@@ -84,13 +84,13 @@ impl PointFilter {
         let [x, y, z, _] = quads(isa, &rows);
         let sum = x.add(y).add(z);
         let normal = isa.splat4(f32::MIN_POSITIVE).le(sum);
-        let apart = I::H::select(normal, sum.sqrt(), largest);
+        let apart = I::F32x4::select(normal, sum.sqrt(), largest);
         largest.max(apart).mul(isa.splat4(1.0 - F32_SLACK))
     }
 
     /// The gaps of four children along four slabs.
     #[inline(always)]
-    fn gaps<I: Isa>(&self, isa: I, children: &Group, quad: usize) -> I::V {
+    fn gaps<I: Isa>(&self, isa: I, children: &Group, quad: usize) -> I::F32x16 {
         let (lo, hi) = (isa.load(&children.lo[quad]), isa.load(&children.hi[quad]));
         let gap = lo.sub(isa.load(&self.slabs.hi[quad])).max(isa.load(&self.slabs.lo[quad]).sub(hi));
         gap.mul(isa.load(&self.inverse_lengths[quad]))
@@ -98,7 +98,7 @@ impl PointFilter {
 }
 
 #[inline(always)]
-pub(super) fn quads<I: Isa>(isa: I, rows: &[f32; 16]) -> [I::H; 4] {
+pub(super) fn quads<I: Isa>(isa: I, rows: &[f32; 16]) -> [I::F32x4; 4] {
     let rows = rows.as_chunks::<4>().0;
     [isa.load4(&rows[0]), isa.load4(&rows[1]), isa.load4(&rows[2]), isa.load4(&rows[3])]
 }

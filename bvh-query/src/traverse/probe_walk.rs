@@ -28,7 +28,7 @@ use bvh_format::treelet::Links;
 /// What a question does with the nodes and leaf packets that a walk meets.
 pub(crate) trait ProbeVisitor {
     /// Returns lower bounds of what is to be least in four nodes: a distance, or the share of a line.
-    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H;
+    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::F32x4;
 
     /// Returns the limit: what has a larger bound is not visited.
     fn limit(&self) -> f32;
@@ -132,7 +132,7 @@ impl Level {
         if !(least <= limit && least != GONE) {
             return None;
         }
-        let equal = |quad: &[f32; 4]| u32::from(I::H::bits(isa.load4(quad).le(isa.splat4(least))));
+        let equal = |quad: &[f32; 4]| u32::from(I::F32x4::bits(isa.load4(quad).le(isa.splat4(least))));
         let nearest = if is_wide { equal(first) | equal(second) << 4 } else { equal(first) };
         let child = nearest.trailing_zeros() as usize & 7;
         self.bounds[child] = GONE;
@@ -288,9 +288,9 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
                 let near = bounds.le(isa.splat4(visitor.limit()));
                 let are_inner = node.inner >> (4 * part) & 0xf;
                 let hidden = isa.load4(&HIDDEN[are_inner as usize]);
-                let kept = I::H::select(near, bounds, isa.splat4(GONE)).max(hidden);
+                let kept = I::F32x4::select(near, bounds, isa.splat4(GONE)).max(hidden);
                 isa.store4(kept, &mut next.bounds.as_chunks_mut().0[part & 1]);
-                let near = u32::from(I::H::bits(near) as u8) << (4 * part);
+                let near = u32::from(I::F32x4::bits(near) as u8) << (4 * part);
                 inner |= near & u32::from(node.inner);
                 leaves |= near & u32::from(node.leaves);
             }
@@ -305,7 +305,7 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
                     }
                     leaves &= leaves - 1;
                 }
-                isa.run(VisitLeaves { visitor: &mut *visitor, leaves: &near[..count] })?;
+                isa.run(VisitProbeLeaves { visitor: &mut *visitor, leaves: &near[..count] })?;
             }
             depth += usize::from(inner != 0);
         }
@@ -314,12 +314,12 @@ impl<V: ProbeVisitor> Task for ProbeWalk<'_, V> {
 }
 
 /// Visits leaf packets.
-struct VisitLeaves<'a, V> {
+struct VisitProbeLeaves<'a, V> {
     visitor: &'a mut V,
     leaves: &'a [LeafPacket],
 }
 
-impl<V: ProbeVisitor> Task for VisitLeaves<'_, V> {
+impl<V: ProbeVisitor> Task for VisitProbeLeaves<'_, V> {
     type Output = Result<(), QueryError>;
 
     #[inline(always)]

@@ -77,15 +77,15 @@ impl TurningGroup {
         let vector = isa.load(&n.0);
         let (at_lo, at_hi) = (vector.mul(lo), vector.mul(hi));
         let down = vector.lt(isa.splat(0.0));
-        let low = sum(isa, I::V::select(down, at_hi, at_lo));
-        let high = sum(isa, I::V::select(down, at_lo, at_hi));
+        let low = sum(isa, I::F32x16::select(down, at_hi, at_lo));
+        let high = sum(isa, I::F32x16::select(down, at_lo, at_hi));
         let mut step = [0.0; 4];
         isa.store4(high.sub(low).mul(isa.splat4(STEP_U8)), &mut step);
         let unit = isa.load4(&step.map(bvh_format::quantize::round_step_up));
         let (lo, hi) = (code_lo.mul_add(unit, low), code_hi.neg_mul_add(unit, high));
         let mut scale = [0.0; 4];
         let inverse = isa.splat4(1.0).div(sum(isa, vector.mul(vector)).sqrt());
-        isa.store4(I::H::select(isa.splat4(0.0).lt(any), inverse, isa.splat4(0.0)), &mut scale);
+        isa.store4(I::F32x4::select(isa.splat4(0.0).lt(any), inverse, isa.splat4(0.0)), &mut scale);
         let direction = vector.mul(isa.tile(&scale));
         isa.store(direction, &mut self.direction.0);
         let along_centre = sum(isa, direction.mul(isa.load(&self.centre.0)));
@@ -97,7 +97,7 @@ impl TurningGroup {
 
 /// The sums of the first three rows.
 #[inline(always)]
-fn sum<I: Isa>(isa: I, rows: I::V) -> I::H {
+fn sum<I: Isa>(isa: I, rows: I::F32x16) -> I::F32x4 {
     let mut stored = Rows::ZERO;
     isa.store(rows, &mut stored.0);
     isa.load4(stored.row(0)).add(isa.load4(stored.row(1))).add(isa.load4(stored.row(2)))
@@ -184,7 +184,7 @@ impl SlabFilter {
         let radius = rest::<I>(u_b_in_a, cosine, u_a, half_a, share.mul_add(width_a, width_b));
         let gap = gap.max(radius.neg_mul_add(outward, distance.abs())).sub(slack);
         if measure != Measure::Distance {
-            return I::V::bits(gap.le(isa.splat(limit)));
+            return I::F32x16::bits(gap.le(isa.splat(limit)));
         }
         // Along the line between the centres, at first not normalised. Where squares might underflow or overflow it has no say.
         let square = dot::<I>(to_b, to_b);
@@ -201,11 +201,11 @@ impl SlabFilter {
         let rest_b = rest::<I>(to_b_in_b, alpha_b, u_b, half_b, alpha_b.abs().mul(width_b));
         let along_line = rest_a.add(rest_b).neg_mul_add(outward, distance).mul(inverse).sub(slack);
         let is_normal = isa.splat(self.least_square).le(square);
-        let gap = I::V::select(is_normal, along_line, gap).max(gap);
+        let gap = I::F32x16::select(is_normal, along_line, gap).max(gap);
         // No direction is longer than 1 by more than 2^-19.
         let gap = gap.mul(isa.splat(1.0 - 1.0 / (1 << 18) as f32)).max(isa.load(bounds));
         isa.store(gap, bounds);
-        I::V::bits(gap.le(isa.splat(limit)))
+        I::F32x16::bits(gap.le(isa.splat(limit)))
     }
 }
 
@@ -218,24 +218,30 @@ const MAX_MAGNITUDES: f64 = (1u64 << 60) as f64;
 
 /// Three rows of nodes of A, in the lanes of their pairs.
 #[inline(always)]
-fn repeat<I: Isa>(isa: I, rows: &Rows) -> [I::V; 3] {
+fn repeat<I: Isa>(isa: I, rows: &Rows) -> [I::F32x16; 3] {
     [isa.repeat(rows.row(0)), isa.repeat(rows.row(1)), isa.repeat(rows.row(2))]
 }
 
 /// Three rows of nodes of B, in the lanes of their pairs.
 #[inline(always)]
-fn tile<I: Isa>(isa: I, rows: &Rows) -> [I::V; 3] {
+fn tile<I: Isa>(isa: I, rows: &Rows) -> [I::F32x16; 3] {
     [isa.tile(rows.row(0)), isa.tile(rows.row(1)), isa.tile(rows.row(2))]
 }
 
 #[inline(always)]
-fn dot<I: Isa>(p: [I::V; 3], q: [I::V; 3]) -> I::V {
+fn dot<I: Isa>(p: [I::F32x16; 3], q: [I::F32x16; 3]) -> I::F32x16 {
     p[2].mul_add(q[2], p[1].mul_add(q[1], p[0].mul(q[0])))
 }
 
 /// Adds to a radius how far a box of half sides `half` reaches along `x - alpha u`.
 #[inline(always)]
-fn rest<I: Isa>(x: [I::V; 3], alpha: I::V, u: [I::V; 3], half: [I::V; 3], radius: I::V) -> I::V {
+fn rest<I: Isa>(
+    x: [I::F32x16; 3],
+    alpha: I::F32x16,
+    u: [I::F32x16; 3],
+    half: [I::F32x16; 3],
+    radius: I::F32x16,
+) -> I::F32x16 {
     let mut sum = radius;
     for axis in 0..3 {
         sum = alpha.neg_mul_add(u[axis], x[axis]).abs().mul_add(half[axis], sum);
@@ -245,7 +251,7 @@ fn rest<I: Isa>(x: [I::V; 3], alpha: I::V, u: [I::V; 3], half: [I::V; 3], radius
 
 /// Multiplies the vectors of four nodes by a matrix of three columns and adds a vector.
 #[inline(always)]
-fn turn<I: Isa>(isa: I, columns: &[Rows; 3], from: &Rows, add: I::V) -> Rows {
+fn turn<I: Isa>(isa: I, columns: &[Rows; 3], from: &Rows, add: I::F32x16) -> Rows {
     let mut sum = add;
     for j in 0..3 {
         sum = isa.tile(from.row(j)).mul_add(isa.load(&columns[j].0), sum);

@@ -31,7 +31,7 @@ use crate::traverse::cached_node::ChildRef;
 use crate::traverse::large_leaf::LargeLeaves;
 use crate::traverse::leaf_pairs::LeafPairs;
 use crate::traverse::node_cache::{NodeCache, Root, max_nodes};
-use crate::traverse::node_filter::{Measure, NodeFilter, Witness};
+use crate::traverse::node_filter::{Measure, NodeFilter, SeparatingDirection};
 use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
 use crate::traverse::placement::ObjectPair;
@@ -73,11 +73,11 @@ pub(crate) trait Visitor {
     /// Whether `order` may be `Order::Best`.
     const MAY_BE_BEST_FIRST: bool = false;
 
-    /// Whether `witness` returns anything.
-    const HAS_WITNESS: bool = false;
+    /// Whether `separating_direction` returns anything.
+    const HAS_SEPARATING_DIRECTION: bool = false;
 
     /// Returns a direction in A's frame, at most 1 long, along which A and B are likely apart.
-    fn witness(&self) -> Option<[f32; 3]> {
+    fn separating_direction(&self) -> Option<[f32; 3]> {
         None
     }
 
@@ -167,7 +167,7 @@ pub(crate) fn traverse<I: Isa, W: Visitor>(
     let order = visitor.order();
     let phase = if matches!(order, Order::Best { .. }) { Phase::Dive } else { Phase::DepthFirst };
     let mut walk =
-        PairWalk { pair, memory, budget, visitor, limit: 0.0, witness: None, order, phase, tests: 0 };
+        PairWalk { pair, memory, budget, visitor, limit: 0.0, separating: None, order, phase, tests: 0 };
     walk.follow_visitor();
     if walk.visit_all(isa)?.is_continue() {
         isa.run(Finish(&mut *walk.visitor))?;
@@ -183,7 +183,7 @@ struct PairWalk<'a, 'p, W> {
     visitor: &'a mut W,
     /// What the visitor said last.
     limit: f32,
-    witness: Option<Witness>,
+    separating: Option<SeparatingDirection>,
     order: Order,
     phase: Phase,
     /// The number of node tests.
@@ -192,7 +192,7 @@ struct PairWalk<'a, 'p, W> {
 
 /// An opened node whose children meet those of the other side. If a node was not opened, its parent stands for it, and only
 /// this one child of the parent is tested.
-struct Side {
+struct OpenedSide {
     /// The first number of the node: of one child, the one that it is in.
     node: usize,
     /// Whether the children under the next number, if it has any of the same node, are tested, too.
@@ -201,7 +201,7 @@ struct Side {
     lanes: u16,
 }
 
-impl Side {
+impl OpenedSide {
     /// All children of an opened node.
     #[inline(always)]
     fn opened(number: usize) -> Self {
@@ -407,8 +407,10 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
     #[inline(always)]
     fn follow_visitor(&mut self) {
         self.limit = self.visitor.limit();
-        if W::HAS_WITNESS {
-            self.memory.node_filter.update_witness(&mut self.witness, self.visitor.witness());
+        if W::HAS_SEPARATING_DIRECTION {
+            self.memory
+                .node_filter
+                .update_separating(&mut self.separating, self.visitor.separating_direction());
         }
     }
 
@@ -456,15 +458,15 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
 
     /// Opens both nodes of a pair, or the inner one against a leaf, or the much larger one.
     #[inline(always)]
-    fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<[Side; 2], QueryError> {
+    fn open<I: Isa>(&mut self, isa: I, entry: Entry) -> Result<[OpenedSide; 2], QueryError> {
         let (pair, tests) = (self.pair, self.tests);
         let PairMemory { node_filter, nodes, left, .. } = &mut *self.memory;
         if !W::SWEEPS && tests >= NODE_TESTS_BEFORE_B_DIRECTIONS && !node_filter.looks_along_b() {
             node_filter.look_along_b(isa);
         }
         let (a, b) = (nodes.child(entry.a), nodes.child(entry.b));
-        let mut side_a = Side::only(entry.a, LANES_OF_A);
-        let mut side_b = Side::only(entry.b, LANES_OF_B);
+        let mut side_a = OpenedSide::only(entry.a, LANES_OF_A);
+        let mut side_b = OpenedSide::only(entry.b, LANES_OF_B);
         let a_is_small = b.extent > EXTENT_RATIO_TO_OPEN_ONE * a.extent;
         // In a forged file both comparisons may hold: one node is opened in any case.
         let b_is_small = (a.extent > EXTENT_RATIO_TO_OPEN_ONE * b.extent) & !a_is_small;
@@ -473,23 +475,23 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             let number = nodes.open(isa, pair.bvh_a, pair.object_a, entry.a, &mut left.0)?;
             #[cfg(feature = "trace")]
             trace::opened(0, nodes.place_in_treelet(entry.a), number);
-            side_a = Side::opened(number);
+            side_a = OpenedSide::opened(number);
         }
         if !b.is_leaf() & (a.is_leaf() | !b_is_small) {
             let number = nodes.open(isa, pair.bvh_b, pair.object_b, entry.b, &mut left.1)?;
             #[cfg(feature = "trace")]
             trace::opened(1, nodes.place_in_treelet(entry.b), number);
-            side_b = Side::opened(number);
+            side_b = OpenedSide::opened(number);
         }
         Ok([side_a, side_b])
     }
 
     /// Tests all pairs of children and keeps those within the limit.
     #[inline(always)]
-    fn push_children<I: Isa>(&mut self, isa: I, [of_a, of_b]: [Side; 2]) {
+    fn push_children<I: Isa>(&mut self, isa: I, [of_a, of_b]: [OpenedSide; 2]) {
         let (measure, phase, order) = (W::MEASURE, self.phase(), self.order);
         let (limit, leaving_limit) = (gap_limit::<W>(self.limit), self.limit);
-        let witness = if W::HAS_WITNESS { &self.witness } else { &None };
+        let separating = if W::HAS_SEPARATING_DIRECTION { &self.separating } else { &None };
         let PairMemory { node_filter, nodes, aligned_a, aligned_b, slabs, stack, leaf_pairs, list, .. } =
             &mut *self.memory;
         let node_filter = &**node_filter;
@@ -507,7 +509,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
             tested.b = ChildRef::new(number_b, 0);
             let groups = (&node_a.group, &node_b.group, &*aligned);
             let (lanes_a, lanes_b) = (node_a.lanes, node_b.lanes);
-            let mut mask = node_filter.run(isa, measure, groups, witness, limit, &mut tested.bounds);
+            let mut mask = node_filter.run(isa, measure, groups, separating, limit, &mut tested.bounds);
             mask &= lanes_a.all[0] & of_a.lanes & lanes_b.all[1] & of_b.lanes;
             if mask != 0 {
                 if slabs.are_due() {

@@ -212,9 +212,9 @@ impl Corners for D {
 }
 
 impl Isa for Avx2 {
-    type V = Y;
-    type H = X;
-    type C = D;
+    type F32x16 = Y;
+    type F32x4 = X;
+    type F64x3 = D;
     type Rows<'a> = &'a Group;
 
     #[inline(always)]

@@ -153,9 +153,9 @@ impl Lanes for X {
 }
 
 impl Isa for Avx512 {
-    type V = Z;
-    type H = X;
-    type C = D;
+    type F32x16 = Z;
+    type F32x4 = X;
+    type F64x3 = D;
     /// The lower and upper ends of four sets of slabs: the axes, the cube's diagonals, and two halves of its faces'
     /// diagonals.
     type Rows<'a> = [[Z; 2]; 4];

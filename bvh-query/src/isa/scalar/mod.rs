@@ -90,9 +90,9 @@ impl<const N: usize> Lanes for Array<N> {
 }
 
 impl Isa for Scalar {
-    type V = Array<16>;
-    type H = Array<4>;
-    type C = Three;
+    type F32x16 = Array<16>;
+    type F32x4 = Array<4>;
+    type F64x3 = Three;
     type Rows<'a> = &'a Group;
 
     #[inline(always)]

@@ -8,7 +8,7 @@
 use crate::error::QueryError;
 use crate::narrow::{Point, common_region, cross, subtract};
 use crate::query::answers::Side;
-use crate::query::depth::line::Line;
+use crate::query::depth::translation::Translation;
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::side::OpenObject;
@@ -59,7 +59,7 @@ impl Balls {
 }
 
 /// A box in which the deepest point may be.
-struct Cell {
+struct CentreBox {
     bound: f64,
     centre: Point,
     half: Point,
@@ -67,25 +67,25 @@ struct Cell {
     number: u32,
 }
 
-impl Ord for Cell {
+impl Ord for CentreBox {
     fn cmp(&self, other: &Self) -> Ordering {
         self.bound.total_cmp(&other.bound).then(other.number.cmp(&self.number))
     }
 }
 
-impl PartialOrd for Cell {
+impl PartialOrd for CentreBox {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Cell {
+impl PartialEq for CentreBox {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Cell {}
+impl Eq for CentreBox {}
 
 /// The most steps by which a centre climbs to a greater sum.
 pub(super) const ASCENT_STEPS: u32 = 10;
@@ -94,12 +94,17 @@ const PRECISION: f64 = 1.0 / 64.0;
 
 impl Querier {
     /// Returns the deepest point that a search finds among some points, or the first one whose sum is `enough`.
-    pub(super) fn balls(&mut self, line: &Line<'_>, points: u32, enough: f64) -> Result<Balls, QueryError> {
+    pub(super) fn balls(
+        &mut self,
+        line: &Translation<'_>,
+        points: u32,
+        enough: f64,
+    ) -> Result<Balls, QueryError> {
         let (a, b) = (line.a.into(), line.b.at(line.pose));
         let Some((centre, half)) = common_box(&a, &b) else { return Ok(line.no_balls()) };
         let mut best = line.no_balls();
         let mut cells = BinaryHeap::new();
-        cells.push(Cell { bound: f64::INFINITY, centre, half, number: 0 });
+        cells.push(CentreBox { bound: f64::INFINITY, centre, half, number: 0 });
         for number in 1..points {
             let Some(mut cell) = cells.pop() else { break };
             best.bound = cell.bound;
@@ -119,7 +124,7 @@ impl Querier {
             for side in [-1.0, 1.0] {
                 let mut centre = cell.centre;
                 centre[widest] += side * half[widest];
-                cells.push(Cell {
+                cells.push(CentreBox {
                     bound: cell.bound,
                     centre,
                     half,
@@ -131,7 +136,7 @@ impl Querier {
     }
 
     /// Returns a deep point that is found from the contact that would be the last to leave along the line.
-    pub(super) fn point_at_contact(&mut self, line: &Line<'_>) -> Result<Balls, QueryError> {
+    pub(super) fn point_at_contact(&mut self, line: &Translation<'_>) -> Result<Balls, QueryError> {
         let (a, b) = (line.a.into(), line.b.at(line.pose));
         let leaving = self.leaving(line, 0.0)?;
         let mut balls = line.no_balls();
@@ -210,7 +215,7 @@ impl Querier {
     }
 }
 
-impl Line<'_> {
+impl Translation<'_> {
     /// No point is known that is inside both shapes.
     pub(super) fn no_balls(&self) -> Balls {
         let nowhere = Depths { a: -1.0, b: -1.0, closest: [[0.0; 3]; 2] };

@@ -19,7 +19,7 @@ use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
 use crate::numerics::UNIT_ROUNDOFF;
 use crate::query::answers::{Distance, Relation};
 use crate::query::depth::leaving::Leaving;
-use crate::query::depth::line::Line;
+use crate::query::depth::translation::Translation;
 use crate::query::querier::Querier;
 
 /// Where a way comes free.
@@ -59,7 +59,7 @@ const FEW_CROSSINGS: f64 = 4.0;
 /// The part of the size by which a common point has to bring a way on.
 const LEAST_PART: f64 = 2e-7;
 
-impl Line<'_> {
+impl Translation<'_> {
     /// Returns the last of the contacts that were found at a place.
     fn last_contact(&self, at: f64, leaving: &Leaving) -> Option<LastContact> {
         let until = leaving.touches_until?;
@@ -89,13 +89,13 @@ struct Gap {
 
 impl Gap {
     /// Returns how far B moves until the two closest points are as far apart as both radii.
-    fn way_out(&self, line: &Line<'_>) -> f64 {
+    fn way_out(&self, line: &Translation<'_>) -> f64 {
         let along = self.distance * dot(self.normal, line.direction);
         let squared = along * along - self.distance * self.distance + line.radii * line.radii;
         squared.max(0.0).sqrt() - along + 16.0 * line.error
     }
 
-    fn contact(&self, line: &Line<'_>, at: f64) -> LastContact {
+    fn contact(&self, line: &Translation<'_>, at: f64) -> LastContact {
         let back = line.translation_at(-at);
         let point_b = [0, 1, 2].map(|k| self.point_b[k] + back[k]);
         LastContact { normal: self.normal, point: self.point_a, triangles: [[self.point_a; 3], [point_b; 3]] }
@@ -107,7 +107,7 @@ impl Querier {
     /// meet at all moves shorter than `from`. A rough search may pass over places that are free for a part of the way to them.
     pub(super) fn free_on(
         &mut self,
-        line: &Line<'_>,
+        line: &Translation<'_>,
         from: f64,
         limit: f64,
         is_rough: bool,
@@ -161,7 +161,7 @@ impl Querier {
     }
 
     /// Returns how far interiors meet without a gap, up to the end of a way.
-    pub(super) fn cover(&mut self, line: &Line<'_>, end: f64) -> Result<f64, QueryError> {
+    pub(super) fn cover(&mut self, line: &Translation<'_>, end: f64) -> Result<f64, QueryError> {
         let mut covered = 0.0;
         while covered < end {
             let leaving = self.leaving(line, covered)?;
@@ -179,7 +179,7 @@ impl Querier {
     }
 
     /// Returns where the cores are at a place, unless they touch.
-    fn gap_of_cores(&mut self, line: &Line<'_>, at: f64) -> Result<Option<Gap>, QueryError> {
+    fn gap_of_cores(&mut self, line: &Translation<'_>, at: f64) -> Result<Option<Gap>, QueryError> {
         let Distance { distance, lower, upper, point_a, point_b, .. } =
             self.distance_of_cores(line.a, line.b, &line.pose_at(at))?;
         if distance <= line.error {
@@ -192,7 +192,7 @@ impl Querier {
     /// Returns how far B moves at least, from a place on where no triangles certainly cross, until interiors do not meet; 0 if that
     /// is not known, or hardly any way. Rounded shapes meet until the gap of their cores is as wide as both radii. If nothing
     /// touches and neither has a radius, one shape or a part of it is inside the other, and stays there until the gap is closed.
-    fn common_way(&mut self, line: &Line<'_>, at: f64, touches: bool) -> Result<f64, QueryError> {
+    fn common_way(&mut self, line: &Translation<'_>, at: f64, touches: bool) -> Result<f64, QueryError> {
         let pose = line.pose_at(at);
         let is_enough = |way: &f64| *way > LEAST_PART * line.size;
         if !touches && let Some(gap) = self.gap_of_cores(line, at)? {
@@ -207,7 +207,7 @@ impl Querier {
                 return Ok(way);
             }
         }
-        let balls = self.balls(&Line { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?;
+        let balls = self.balls(&Translation { pose: &pose, ..*line }, COMMON_POINTS, f64::INFINITY)?;
         Ok(Some(balls.lower()).filter(is_enough).unwrap_or(0.0))
     }
 }

@@ -9,7 +9,7 @@ use crate::numerics::round_up;
 use crate::query::answers::QueryStats;
 use crate::query::bounding_volumes::surely_apart;
 use crate::query::collide::{Candidates, ContactVisitor};
-use crate::query::depth::line::Line;
+use crate::query::depth::translation::Translation;
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::traverse::node_filter::Measure;
@@ -46,7 +46,7 @@ impl Leaving {
 
 impl Querier {
     /// Returns what stays in contact the longest, from a place of B on a line on.
-    pub(super) fn leaving(&mut self, line: &Line<'_>, at: f64) -> Result<Leaving, QueryError> {
+    pub(super) fn leaving(&mut self, line: &Translation<'_>, at: f64) -> Result<Leaving, QueryError> {
         let found = Cell::new(Leaving {
             crosses_until: 0.0,
             touches_until: None,
@@ -63,7 +63,7 @@ impl Querier {
     fn leaving_of(
         &mut self,
         placed: &PlacedPair<'_>,
-        line: &Line<'_>,
+        line: &Translation<'_>,
         found: &Cell<Leaving>,
     ) -> Result<(), QueryError> {
         self.memory.budget.visit()?;
@@ -201,7 +201,7 @@ mod tests {
                     d.map(|x| x / length)
                 }
             };
-            let line = Line::new(a.all(), b.all(), &pose).along(direction);
+            let line = Translation::new(a.all(), b.all(), &pose).along(direction);
             let at = 0.1 * random.unit();
             let way = Way { direction, length: line.length, error: line.placing };
             let mut expected = Leaving {

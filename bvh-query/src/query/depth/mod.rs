@@ -4,6 +4,6 @@ mod balls;
 pub(crate) mod clash;
 mod free;
 mod leaving;
-mod line;
 pub(crate) mod penetration;
 mod planes;
+mod translation;

@@ -12,8 +12,8 @@ use crate::pose::Pose;
 use crate::query::answers::Relation;
 use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
 use crate::query::depth::free::{Free, LastContact};
-use crate::query::depth::line::{Line, moved};
 use crate::query::depth::planes::{Plane, shortest_beyond};
+use crate::query::depth::translation::{Translation, moved};
 use crate::query::options::check;
 use crate::query::querier::Querier;
 use bvh_format::kdop::FACTORS;
@@ -130,7 +130,7 @@ impl Querier {
         if self.relation_of(a, b, pose)? == Relation::Apart {
             return Ok(Separation { lower: 0.0, upper: 0.0, translation: [0.0; 3] });
         }
-        let line = Line::new(a, b, pose).along(direction);
+        let line = Translation::new(a, b, pose).along(direction);
         let (lower, upper) = match self.free_on(&line, 0.0, f64::INFINITY, false)? {
             Some(Free { at, .. }) => (self.cover(&line, at)?, at),
             // Only in a file with forged bounds are interiors beyond boxes.
@@ -182,7 +182,7 @@ impl Querier {
         pose: &Pose,
         options: &PenetrationOptions,
     ) -> Result<Penetration, QueryError> {
-        let mut search = DepthSearch::new(Line::new(a, b, pose), options);
+        let mut search = DepthSearch::new(Translation::new(a, b, pose), options);
         let is_spent = match search.run(self) {
             Err(QueryError::Budget { .. }) => true,
             result => result.map(|()| false)?,
@@ -213,7 +213,7 @@ const SHARES: [f64; 4] = [1.0 / 2.0, 1.0 / 8.0, 1.0 / 32.0, 1.0 / 256.0];
 
 /// What is known of a depth.
 struct DepthSearch<'a> {
-    line: Line<'a>,
+    line: Translation<'a>,
     options: PenetrationOptions,
     /// The shortest translation so far.
     translation: Point,
@@ -223,7 +223,7 @@ struct DepthSearch<'a> {
 
 impl<'a> DepthSearch<'a> {
     /// Begins with the shortest way that takes B's box out of A's.
-    fn new(line: Line<'a>, options: &PenetrationOptions) -> Self {
+    fn new(line: Translation<'a>, options: &PenetrationOptions) -> Self {
         let [[lo_a, hi_a], [lo_b, hi_b]] = [line.a.into(), line.b.at(line.pose)].map(|shape| bounds(&shape));
         let spare = 8.0 * line.error;
         let mut search = Self {
@@ -320,7 +320,7 @@ impl<'a> DepthSearch<'a> {
                 return Ok(());
             }
             let pose = moved(self.line.pose, shift);
-            balls = querier.point_at_contact(&Line { pose: &pose, direction: normal, ..self.line })?;
+            balls = querier.point_at_contact(&Translation { pose: &pose, direction: normal, ..self.line })?;
         }
         unit(shift).map_or(Ok(()), |direction| self.descend(querier, direction))
     }
@@ -368,7 +368,7 @@ impl<'a> DepthSearch<'a> {
     fn look_behind(
         &mut self,
         querier: &mut Querier,
-        line: &Line<'_>,
+        line: &Translation<'_>,
         at: f64,
         last: &LastContact,
     ) -> Result<(), QueryError> {

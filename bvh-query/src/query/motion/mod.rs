@@ -36,7 +36,7 @@ use crate::pose::Pose;
 use crate::query::answers::Distance;
 use crate::query::options::{DistanceOptions, check};
 use crate::query::querier::Querier;
-use crate::query::search::Search;
+use crate::query::search::PairSearch;
 use question::Question;
 use search::{Outcome, TimeSearch};
 
@@ -223,7 +223,7 @@ impl Querier {
         {
             return Ok(first.distance(0.0));
         }
-        let mut search = Search::new(DistanceOptions::default(), f64::INFINITY);
+        let mut search = PairSearch::new(DistanceOptions::default(), f64::INFINITY);
         let best = self.nearest(question.a, question.b, pose, &mut search)?;
         let best = best.ok_or_else(|| crate::query::distance::no_answer(question.a))?;
         self.distance_of_shapes(question.a, question.b, pose, best.distance(search.proved()))
@@ -236,5 +236,5 @@ impl Querier {
 pub fn path_reach<'a>(b: impl Into<Shape<'a>>, path: &dyn RigidPath, t0: f64, t1: f64) -> f64 {
     let b = b.into();
     let question = Question::unchecked(b, b, path);
-    question.middle(&question.stretch(t0, t1)).reach
+    question.middle(&question.span(t0, t1)).reach
 }

@@ -9,7 +9,7 @@ use crate::narrow::{
 };
 use crate::pose::Pose;
 use crate::query::exact::placed;
-use crate::query::motion::question::{Question, Stretch};
+use crate::query::motion::question::{Question, TimeSpan};
 use crate::query::querier::Querier;
 use std::rc::Rc;
 
@@ -131,11 +131,11 @@ impl Querier {
     pub(super) fn contact_time(
         &mut self,
         question: &Question<'_>,
-        stretch: &Stretch,
+        span: &TimeSpan,
         pairs: &[SweptPair],
     ) -> Option<f64> {
         self.stats.exact_tests += pairs.len() as u64;
-        self.backend.run(ContactTime { path: question.path, clearance: question.clearance, stretch, pairs })
+        self.backend.run(ContactTime { path: question.path, clearance: question.clearance, span, pairs })
     }
 }
 
@@ -189,15 +189,15 @@ impl Task for AnyWithin<'_> {
 struct ContactTime<'a> {
     path: &'a dyn RigidPath,
     clearance: f64,
-    stretch: &'a Stretch,
+    span: &'a TimeSpan,
     pairs: &'a [SweptPair],
 }
 
 impl ContactTime<'_> {
     #[inline(always)]
     fn of<I: Isa>(&self, isa: I, pair: &SweptPair, before: f64) -> Option<f64> {
-        let ([start, end], last) = (self.stretch.times, &self.stretch.poses[1]);
-        let (mut time, mut pose) = (start, self.stretch.poses[0]);
+        let ([start, end], last) = (self.span.times, &self.span.poses[1]);
+        let (mut time, mut pose) = (start, self.span.poses[0]);
         for _ in 0..MOST_STEPS {
             let b = placed(&pair.b, &pose);
             let Closest { point_a, point_b, distance, .. } = triangle_distance_with(isa, &pair.a, &b);
@@ -230,7 +230,7 @@ impl Task for ContactTime<'_> {
     fn run<I: Isa>(self, isa: I) -> Option<f64> {
         let mut earliest = None;
         for pair in self.pairs {
-            earliest = self.of(isa, pair, earliest.unwrap_or(self.stretch.times[1])).or(earliest);
+            earliest = self.of(isa, pair, earliest.unwrap_or(self.span.times[1])).or(earliest);
         }
         earliest
     }

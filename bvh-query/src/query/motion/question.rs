@@ -39,7 +39,7 @@ pub(super) struct Question<'a> {
 
 /// An interval of time, and the poses of B at its ends.
 #[derive(Clone, Copy)]
-pub(super) struct Stretch {
+pub(super) struct TimeSpan {
     pub(super) times: [f64; 2],
     pub(super) poses: [Pose; 2],
 }
@@ -83,25 +83,25 @@ impl<'a> Question<'a> {
     }
 
     /// Returns the interval between two times.
-    pub(super) fn stretch(&self, t0: f64, t1: f64) -> Stretch {
-        Stretch { times: [t0, t1], poses: [self.path.pose(t0), self.path.pose(t1)] }
+    pub(super) fn span(&self, t0: f64, t1: f64) -> TimeSpan {
+        TimeSpan { times: [t0, t1], poses: [self.path.pose(t0), self.path.pose(t1)] }
     }
 
     /// Returns the middle of an interval.
-    pub(super) fn middle(&self, stretch: &Stretch) -> Middle {
-        let [t0, t1] = stretch.times;
+    pub(super) fn middle(&self, span: &TimeSpan) -> Middle {
+        let [t0, t1] = span.times;
         let at = t0 + (t1 - t0) / 2.0;
         let pose = self.path.pose(at);
         let half = |end: &Pose, from, to| displacement(self.b, &pose, end) + self.sagitta(from, to);
-        let reach = half(&stretch.poses[0], t0, at).max(half(&stretch.poses[1], at, t1));
+        let reach = half(&span.poses[0], t0, at).max(half(&span.poses[1], at, t1));
         Middle { at, pose, reach }
     }
 
     /// Returns how far apart parts must be at both ends of an interval to be farther apart than the sum of the clearance and
     /// `reach` all the time.
-    pub(super) fn limit(&self, stretch: &Stretch, reach: f64) -> f64 {
-        let [t0, t1] = stretch.times;
-        let translations = stretch.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
+    pub(super) fn limit(&self, span: &TimeSpan, reach: f64) -> f64 {
+        let [t0, t1] = span.times;
+        let translations = span.poses.iter().flat_map(|pose| pose.translation()).map(f64::abs);
         let magnitude = 3.0 * (self.radius + self.radius_a) + translations.sum::<f64>();
         let least = self.clearance + reach + self.sagitta(t0, t1);
         least * (1.0 + CELL_ERROR) + CELL_ERROR * magnitude
@@ -112,8 +112,8 @@ impl<'a> Question<'a> {
     ///
     /// If B slides, it moves steadily but for the sagitta s: in cells of one length, by d with at most 2 s to spare. So if such cells certainly
     /// reach no more than the eighth, and those of twice the length certainly more, then all cells have that length.
-    pub(super) fn reach_of_cells(&self, stretch: &Stretch) -> f64 {
-        let ([t0, t1], [start, end]) = (stretch.times, &stretch.poses);
+    pub(super) fn reach_of_cells(&self, span: &TimeSpan) -> f64 {
+        let ([t0, t1], [start, end]) = (span.times, &span.poses);
         let most = self.tolerance / 8.0;
         if !self.path.slides(t0, t1) {
             return most;
@@ -134,10 +134,10 @@ impl<'a> Question<'a> {
 
     /// The same limit for boxes along A's axes. If B slides, rounding moves each corner to where it is in some pose, or not as far,
     /// and a rounded gap exceeds a number only if the exact one does.
-    pub(super) fn box_limit(&self, stretch: &Stretch, reach: f64) -> f64 {
-        let [t0, t1] = stretch.times;
+    pub(super) fn box_limit(&self, span: &TimeSpan, reach: f64) -> f64 {
+        let [t0, t1] = span.times;
         match reach {
-            _ if !self.path.slides(t0, t1) => self.limit(stretch, reach),
+            _ if !self.path.slides(t0, t1) => self.limit(span, reach),
             0.0 => self.clearance,
             // As cells round it.
             _ => (self.clearance + reach).next_up(),

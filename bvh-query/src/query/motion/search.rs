@@ -19,7 +19,7 @@ use crate::error::{NumberError, QueryError};
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
 use crate::query::motion::pairs::{Kept, Sweep};
-use crate::query::motion::question::{MAX_DEPTH, Middle, Question, Stretch};
+use crate::query::motion::question::{MAX_DEPTH, Middle, Question, TimeSpan};
 use crate::query::motion::sweep::Room;
 use crate::query::placed_pair::each_pair;
 use crate::query::querier::Querier;
@@ -55,7 +55,7 @@ pub(super) enum Outcome {
 /// An interval of time to search, which comes from halving the whole time `depth` times.
 #[derive(Clone)]
 struct Interval {
-    stretch: Stretch,
+    span: TimeSpan,
     depth: u32,
     /// Whether the end is within the clearance, if that is known. If it is, no sweep can separate the meshes all the
     /// time.
@@ -117,7 +117,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     fn first_before(&mut self, earliest: &Earliest) -> Result<Outcome, QueryError> {
         let whole = self.whole();
-        if self.is_hit(&whole.stretch.poses[0])? {
+        if self.is_hit(&whole.span.poses[0])? {
             return Ok(Outcome::Hit { free_until: 0.0, touching_at: 0.0 });
         }
         let found = self.in_order(whole, earliest)?;
@@ -133,13 +133,13 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     fn in_order(&mut self, interval: Interval, earliest: &Earliest) -> Result<Outcome, QueryError> {
         let mut todo = vec![interval];
         while let Some(interval) = todo.pop() {
-            self.decided_until = interval.stretch.times[0];
+            self.decided_until = interval.span.times[0];
             if self.decided_until > earliest.time() {
                 break;
             }
-            let middle = self.middle(&interval.stretch)?;
+            let middle = self.middle(&interval.span)?;
             if self.is_cell(&middle) {
-                let start = interval.stretch.times[0];
+                let start = interval.span.times[0];
                 match self.decide(&interval, &middle)? {
                     Cell::Clear => {}
                     Cell::Hit => {
@@ -159,7 +159,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     /// them, because poses that are spread over the path find a hit earlier.
     pub(super) fn is_free(&mut self) -> Result<bool, QueryError> {
         let (whole, clearance) = (self.whole(), self.question.clearance);
-        if self.is_hit(&whole.stretch.poses[0])? {
+        if self.is_hit(&whole.span.poses[0])? {
             return Ok(false);
         }
         let mut todo = VecDeque::from([whole]);
@@ -168,7 +168,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             let Some(mut interval) = (if spread { todo.pop_front() } else { todo.pop_back() }) else {
                 return Ok(true);
             };
-            let middle = self.middle(&interval.stretch)?;
+            let middle = self.middle(&interval.span)?;
             if self.is_cell(&middle) {
                 if !matches!(self.decide(&interval, &middle)?, Cell::Clear) {
                     return Ok(false);
@@ -191,13 +191,13 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     }
 
     fn whole(&self) -> Interval {
-        Interval { stretch: self.question.stretch(0.0, 1.0), depth: 0, ends_within: None, pairs: None }
+        Interval { span: self.question.span(0.0, 1.0), depth: 0, ends_within: None, pairs: None }
     }
 
     /// Returns the middle of an interval, and charges it to the budget, because it takes a step for each object of B.
-    fn middle(&mut self, stretch: &Stretch) -> Result<Middle, QueryError> {
+    fn middle(&mut self, span: &TimeSpan) -> Result<Middle, QueryError> {
         self.querier.memory.budget.charge(self.question.b.objects().len() as u64)?;
-        Ok(self.question.middle(stretch))
+        Ok(self.question.middle(span))
     }
 
     fn is_cell(&self, middle: &Middle) -> bool {
@@ -239,7 +239,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             }
             if can_halve
                 && middle.reach > LEAST_GUESSED * self.question.tolerance
-                && let Some(time) = self.querier.contact_time(self.question, &interval.stretch, pairs.left())
+                && let Some(time) = self.querier.contact_time(self.question, &interval.span, pairs.left())
             {
                 return self.descend(interval, Some(time), todo);
             }
@@ -249,7 +249,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             let clearance = self.question.clearance;
             halves[0].ends_within = Some(self.is_within(&middle.pose, clearance)?);
             if interval.ends_within.is_none() {
-                halves[1].ends_within = Some(self.is_within(&interval.stretch.poses[1], clearance)?);
+                halves[1].ends_within = Some(self.is_within(&interval.span.poses[1], clearance)?);
             }
         }
         todo.extend(halves.into_iter().rev());
@@ -268,7 +268,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
             return Ok(());
         }
         loop {
-            let middle = self.middle(&interval.stretch)?;
+            let middle = self.middle(&interval.span)?;
             if self.is_cell(&middle) {
                 todo.push(interval);
                 return Ok(());
@@ -284,13 +284,13 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
 
     /// Returns how far apart parts must be at both ends of an interval to be left out. Before the first undecided cell, all cells
     /// of what is left out are clear. After it, only hits matter, and none of these cells is one.
-    fn limit(&self, stretch: &Stretch) -> f64 {
-        self.question.limit(stretch, self.reach(stretch))
+    fn limit(&self, span: &TimeSpan) -> f64 {
+        self.question.limit(span, self.reach(span))
     }
 
     /// How far B may be from its pose in the middle of a cell, if cells that are not clear matter.
-    fn reach(&self, stretch: &Stretch) -> f64 {
-        if self.undecided.is_none() { self.question.reach_of_cells(stretch) } else { 0.0 }
+    fn reach(&self, span: &TimeSpan) -> f64 {
+        if self.undecided.is_none() { self.question.reach_of_cells(span) } else { 0.0 }
     }
 
     /// Returns whether a pose is a hit.
@@ -315,7 +315,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     ) -> Result<(), QueryError> {
         let mut passed = Vec::new();
         loop {
-            let middle = self.middle(&interval.stretch)?;
+            let middle = self.middle(&interval.span)?;
             let is_fine = time.is_none() && middle.reach <= FINE * self.question.size;
             // An interval too deep to be halved is an error only when its turn comes.
             if is_fine || self.is_cell(&middle) || interval.depth == MAX_DEPTH {
@@ -335,7 +335,7 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
                 interval = right;
             }
         }
-        let contact = self.question.stretch(time.unwrap_or(interval.stretch.times[1]), 1.0);
+        let contact = self.question.span(time.unwrap_or(interval.span.times[1]), 1.0);
         todo.push(interval);
         self.pass(passed, &contact, todo)
     }
@@ -344,21 +344,21 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     fn pass(
         &mut self,
         passed: Vec<Interval>,
-        contact: &Stretch,
+        contact: &TimeSpan,
         todo: &mut Vec<Interval>,
     ) -> Result<(), QueryError> {
         let first_new = todo.len();
         let mut rest = passed.as_slice();
         while let [first, ..] = rest {
-            let (count, stretch) = self.safe_stretch(rest, contact);
+            let (count, span) = self.safe_stretch(rest, contact);
             let (group, later) = rest.split_at(count);
             rest = later;
             if count == 1 {
                 todo.push(first.clone());
                 continue;
             }
-            let joined = Interval { stretch, ..first.clone() };
-            let middle = self.question.middle(&stretch).pose;
+            let joined = Interval { span, ..first.clone() };
+            let middle = self.question.middle(&span).pose;
             let pairs = self.not_apart(&joined, &middle)?;
             let is_apart = pairs.as_ref().is_some_and(|pairs| pairs.left().is_empty());
             if !is_apart || self.may_be_inside() && self.is_inside(&middle)? {
@@ -370,17 +370,17 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     }
 
     /// Returns how many of some adjoining intervals one sweep is likely to clear together, and their union.
-    fn safe_stretch(&self, rest: &[Interval], contact: &Stretch) -> (usize, Stretch) {
-        let start = &rest[0].stretch;
+    fn safe_stretch(&self, rest: &[Interval], contact: &TimeSpan) -> (usize, TimeSpan) {
+        let start = &rest[0].span;
         let (time, pose) = (contact.times[0], contact.poses[0]);
         let speed = displacement(self.question.b, &start.poses[0], &pose) / (time - start.times[0]);
         let joined = |count: usize| {
-            let end = &rest[count - 1].stretch;
-            Stretch { times: [start.times[0], end.times[1]], poses: [start.poses[0], end.poses[1]] }
+            let end = &rest[count - 1].span;
+            TimeSpan { times: [start.times[0], end.times[1]], poses: [start.poses[0], end.poses[1]] }
         };
         let is_safe = |count: &usize| {
-            let stretch = joined(*count);
-            speed * (time - stretch.times[1]) >= SAFE_REST * self.limit(&stretch)
+            let span = joined(*count);
+            speed * (time - span.times[1]) >= SAFE_REST * self.limit(&span)
         };
         let count = (2..=rest.len()).rev().find(is_safe).unwrap_or(1);
         (count, joined(count))
@@ -391,9 +391,9 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
         if interval.depth == MAX_DEPTH {
             return Err(NumberError::Unresolved(self.question.tolerance).into());
         }
-        let Stretch { times: [t0, t1], poses: [start, end] } = interval.stretch;
+        let TimeSpan { times: [t0, t1], poses: [start, end] } = interval.span;
         let half = |times, poses, ends_within| Interval {
-            stretch: Stretch { times, poses },
+            span: TimeSpan { times, poses },
             depth: interval.depth + 1,
             ends_within,
             pairs: interval.pairs.clone(),
@@ -408,10 +408,10 @@ impl<'s, 'a> TimeSearch<'s, 'a> {
     /// there are many. If the list is not empty, its first pair may do so.
     fn not_apart(&mut self, interval: &Interval, middle: &Pose) -> Result<Option<Kept>, QueryError> {
         let question = self.question;
-        let [start, end] = interval.stretch.poses;
-        let reach = self.reach(&interval.stretch);
+        let [start, end] = interval.span.poses;
+        let reach = self.reach(&interval.span);
         let [limit, box_limit] =
-            [question.limit(&interval.stretch, reach), question.box_limit(&interval.stretch, reach)];
+            [question.limit(&interval.span, reach), question.box_limit(&interval.span, reach)];
         let sweep = Sweep { start, middle: *middle, end, limit, box_limit };
         let pairs = match &interval.pairs {
             Some(pairs) => pairs.clone(),
@@ -471,7 +471,7 @@ mod tests {
         let mut search = TimeSearch::new(&mut querier, &question);
         let interval = Interval { pairs: Some(Kept::new(vec![pair])), ..search.whole() };
         let mut touches_at =
-            |time: usize| search.querier.any_pair_within(&[pair], &interval.stretch.poses[time], 0.0);
+            |time: usize| search.querier.any_pair_within(&[pair], &interval.span.poses[time], 0.0);
         if touches_at(0) {
             return Outcome::Hit { free_until: 0.0, touching_at: 0.0 };
         }

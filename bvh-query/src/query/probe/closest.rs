@@ -32,7 +32,7 @@ const MAX_BOUNDED: usize = 256;
 
 /// The closest triangle so far.
 #[derive(Clone, Copy)]
-struct Best {
+struct BestTriangle {
     closest: Closest,
     object: u32,
     /// Ids are read where they matter: of the answer, and of triangles that tie.
@@ -96,7 +96,7 @@ impl Querier {
         within: f64,
         is_within: IsWithin,
     ) -> Result<Option<ClosestPoint>, QueryError> {
-        let mut search = Search {
+        let mut search = TriangleSearch {
             point: *point,
             is_within,
             within,
@@ -142,20 +142,20 @@ pub(super) fn beyond(core: ClosestPoint, point: Point, radius: f64) -> ClosestPo
 }
 
 /// What is known of a point, over all objects.
-struct Search {
+struct TriangleSearch {
     point: Point,
     is_within: IsWithin,
     within: f64,
     /// Triangles whose lower bound exceeds it do not matter.
     limit: f64,
-    best: Option<Best>,
+    best: Option<BestTriangle>,
     /// The least certified lower bound of the triangles that were measured.
     settled_lower: f64,
 }
 
-impl Search {
+impl TriangleSearch {
     fn answer(&self, shape: Shape<'_>) -> Result<Option<ClosestPoint>, QueryError> {
-        let Some(Best { closest, object, place }) = self.best else { return Ok(None) };
+        let Some(BestTriangle { closest, object, place }) = self.best else { return Ok(None) };
         let of = &shape.objects()[object as usize - shape.first()];
         let triangle = shape.bvh().triangle_id(of, place)?;
         let Closest { distance, upper, point_a, .. } = closest;
@@ -167,7 +167,7 @@ impl Search {
 
 /// Searches an object.
 struct SearchObject<'a> {
-    search: &'a mut Search,
+    search: &'a mut TriangleSearch,
     placed: &'a PlacedShape<'a>,
     index: usize,
     memory: &'a mut WalkMemory,
@@ -182,7 +182,7 @@ impl Task for SearchObject<'_> {
     fn run<I: Isa>(self, isa: I) -> Self::Output {
         let Self { search, placed, index, memory, bounded } = self;
         bounded.clear();
-        let mut visitor = Nearest::new(isa, search, placed, index, bounded);
+        let mut visitor = NearestTriangles::new(isa, search, placed, index, bounded);
         let tests = isa.run(memory.probe_walk(visitor.bvh, visitor.object, &mut visitor))?;
         visitor.settle(isa)?;
         let limit = f64::from(visitor.limit) / (visitor.scale * visitor.stretch);
@@ -193,8 +193,8 @@ impl Task for SearchObject<'_> {
 }
 
 /// Collects triangles of an object that may be the closest.
-struct Nearest<'a> {
-    search: &'a mut Search,
+struct NearestTriangles<'a> {
+    search: &'a mut TriangleSearch,
     bvh: &'a Bvh,
     object: &'a Object,
     pose: Option<&'a Pose>,
@@ -214,11 +214,11 @@ struct Nearest<'a> {
     stats: QueryStats,
 }
 
-impl<'a> Nearest<'a> {
+impl<'a> NearestTriangles<'a> {
     #[inline(always)]
     fn new<I: Isa>(
         isa: I,
-        search: &'a mut Search,
+        search: &'a mut TriangleSearch,
         placed: &'a PlacedShape<'a>,
         index: usize,
         bounded: &'a mut Vec<BoundedTriangle>,
@@ -279,7 +279,7 @@ impl<'a> Nearest<'a> {
                 IsWithin::Open => triangles_below(&triangle, &[point; 3], &closest, search.within),
             };
             if is_better && is_within {
-                self.search.best = Some(Best { closest, object: self.number, place });
+                self.search.best = Some(BestTriangle { closest, object: self.number, place });
             }
             self.search.settled_lower = self.search.settled_lower.min(closest.lower);
             self.limit = self.limit.min(round_up(closest.upper * (1.0 + SLACK) * self.stretch * self.scale));
@@ -294,9 +294,9 @@ impl<'a> Nearest<'a> {
     }
 }
 
-impl ProbeVisitor for Nearest<'_> {
+impl ProbeVisitor for NearestTriangles<'_> {
     #[inline(always)]
-    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
+    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::F32x4 {
         self.test.bounds(isa, children)
     }
 
@@ -312,7 +312,7 @@ impl ProbeVisitor for Nearest<'_> {
         let bounds = point_bounds(isa, packets, &self.local);
         let nearest = isa.least(&bounds.upper, valid) as usize & 15;
         self.limit = self.limit.min(round_up(f64::from(bounds.upper[nearest]) * self.stretch));
-        let mut left = valid & I::V::bits(isa.load(&bounds.lower).le(isa.splat(self.limit)));
+        let mut left = valid & I::F32x16::bits(isa.load(&bounds.lower).le(isa.splat(self.limit)));
         while left != 0 {
             let at = left.trailing_zeros() as usize & 15;
             left &= left - 1;

@@ -299,7 +299,7 @@ impl Walked<'_> {
 
 impl ProbeVisitor for Walked<'_> {
     #[inline(always)]
-    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::H {
+    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::F32x4 {
         self.test.entries(isa, children)
     }
 

@@ -209,7 +209,7 @@ impl Tree {
             // Not fused, so that all backends leave the same lanes.
             sum = sum.add(apart.mul(apart));
         }
-        I::V::bits(sum.le(isa.splat(limit))) & ((1u32 << node.count) - 1) as u16
+        I::F32x16::bits(sum.le(isa.splat(limit))) & ((1u32 << node.count) - 1) as u16
     }
 
     /// Builds the tree. Places are below `places`.

@@ -9,7 +9,7 @@ use crate::query::rounded::sum_of_radii;
 
 /// Two shapes, and the line that B moves on.
 #[derive(Clone, Copy)]
-pub(super) struct Line<'a> {
+pub(super) struct Translation<'a> {
     pub(super) a: Shape<'a>,
     pub(super) b: Shape<'a>,
     pub(super) pose: &'a Pose,
@@ -29,7 +29,7 @@ pub(super) struct Line<'a> {
     pub(super) grain: f64,
 }
 
-impl<'a> Line<'a> {
+impl<'a> Translation<'a> {
     pub(super) fn new(a: Shape<'a>, b: Shape<'a>, pose: &'a Pose) -> Self {
         let radii = sum_of_radii(a, b);
         let (mut size, mut magnitude, mut grain) = (radii, 0.0, f64::INFINITY);
