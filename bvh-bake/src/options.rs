@@ -3,8 +3,7 @@
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 
-/// The time that a bake spends on a better tree. The answers are the same; `spec/rationale.md` lists times and file
-/// sizes.
+/// The time that a bake spends on a better tree. The answers are the same; `spec/decisions.md` says what each saves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Effort {

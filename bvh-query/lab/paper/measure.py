@@ -1,4 +1,4 @@
-"""Measures what spec/paper.md tells, and writes it as JSON: memory, bounds and times of five meshes in every layout, beside others.
+"""Measures what paper.md of the notebook tells, and writes it as JSON: memory, bounds and times of five meshes in every layout.
 
 Each mesh is asked about itself, in poses found from a seed: turned at random, it comes from a random direction until the gap is a
 given part of the diagonal of its box. `cbvh query --bench` asks cbvh. compare.py asks Coal and FCL, and pqp.cpp asks PQP; each

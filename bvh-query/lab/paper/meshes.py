@@ -1,4 +1,4 @@
-"""Gets the five meshes of spec/paper.md, the nearest to those of the paper that anyone can get, and writes them as OBJ.
+"""Gets the five meshes of paper.md of the notebook, the nearest to those of the paper that anyone can get, and writes them as OBJ.
 
 Robots come from PyPI and from a git repository, the space station from another one. Each is merged into one mesh, at zero
 configuration, with its coordinates rounded to f32. What cannot be had is left out, with a message.

@@ -1,6 +1,6 @@
-"""Makes the tables of spec/paper.md from the figures that measure.py wrote, and puts them into the page.
+"""Makes the tables of paper.md of the notebook from the figures that measure.py wrote, and puts them into the page.
 
-    page.py [--figures spec/paper.json] [--page spec/paper.md] [--check]
+    page.py [--figures paper.json] [--page paper.md] [--check]
 
 Each table stands between the comments `<!-- made: NAME -->` and `<!-- end -->`. With --check, nothing is written, and the exit code
 is 1 if the page has other tables than the figures give.
@@ -17,6 +17,7 @@ import sys
 from typing import Any, Callable, Iterable
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+NOTEBOOK = ROOT / "bvh-query/lab/notebook"
 PLAIN = "dop14-f32 f32"  # the uncompressed layout, to which times are compared
 FAST, SMALL = "dop26-u8-wide f32", "dop6-u8 packed"
 LIBRARIES = {"pqp": "PQP", "coal": "Coal", "fcl": "FCL"}
@@ -179,8 +180,8 @@ def filled(page: str, told: dict) -> str:
 def main() -> int:
     assert __doc__ is not None
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--figures", type=pathlib.Path, default=ROOT / "spec/paper.json")
-    parser.add_argument("--page", type=pathlib.Path, default=ROOT / "spec/paper.md")
+    parser.add_argument("--figures", type=pathlib.Path, default=NOTEBOOK / "paper.json")
+    parser.add_argument("--page", type=pathlib.Path, default=NOTEBOOK / "paper.md")
     parser.add_argument("--check", action="store_true", help="compare, and write nothing")
     arguments = parser.parse_args()
     page = arguments.page.read_text()

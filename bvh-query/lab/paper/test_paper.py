@@ -17,13 +17,12 @@ sys.path.insert(0, str(HERE))
 import page  # noqa: E402
 import predictors  # noqa: E402
 
-SPEC = page.ROOT / "spec"
 CBVH = os.environ.get("CBVH")
 
 
 class Page(unittest.TestCase):
     def test_tables_are_those_of_the_figures(self) -> None:
-        text, told = (SPEC / "paper.md").read_text(), json.loads((SPEC / "paper.json").read_text())
+        text, told = (page.NOTEBOOK / "paper.md").read_text(), json.loads((page.NOTEBOOK / "paper.json").read_text())
         self.assertEqual(text, page.filled(text, told))
         told["meshes"]["nao"]["triangles"] += 1
         self.assertNotEqual(text, page.filled(text, told))
