@@ -110,9 +110,9 @@ pub use query::displacement::displacement;
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;
 pub use query::patches::{Patch, PatchOptions, Patches};
-#[cfg(feature = "parallel")]
-pub use query::probe::batch::ProbeBatch;
 pub use query::probe::placed::PlacedShape;
+#[cfg(feature = "parallel")]
+pub use query::probe::probe_batch::ProbeBatch;
 pub use query::probe::ray::Ray;
 pub use query::querier::Querier;
 pub use query::regions::{ContactRegion, ContactRegions, RegionKind};

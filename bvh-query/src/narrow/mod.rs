@@ -17,27 +17,27 @@
 //! panics, but the answer is no longer proven.
 
 mod candidates;
-mod distance;
+mod contact_region;
 mod integers;
-mod intersect;
-mod point;
-mod ray;
-mod region;
-mod rounded;
+mod intersection;
+mod point_distance;
+mod ray_crossing;
+mod rounded_ray;
 mod self_contact;
 mod stretch;
+mod triangle_distance;
 mod winding;
 mod within;
 
-pub(crate) use distance::{Closest, triangle_distance, triangle_distance_with};
-pub(crate) use intersect::{segment_intersects, triangles_intersect};
-pub(crate) use point::point_distance;
-pub(crate) use ray::{Crossing, Ray};
-pub(crate) use region::{MAX_POINTS, common_region, unit, unit_normal};
-pub(crate) use rounded::rounded_crossing;
+pub(crate) use contact_region::{MAX_POINTS, common_region, unit, unit_normal};
+pub(crate) use intersection::{segment_intersects, triangles_intersect};
+pub(crate) use point_distance::point_distance;
+pub(crate) use ray_crossing::{Crossing, Ray};
+pub(crate) use rounded_ray::rounded_crossing;
 pub use self_contact::SelfContactKind;
 pub(crate) use self_contact::self_contact;
 pub(crate) use stretch::{Way, leaves_before, stretch};
+pub(crate) use triangle_distance::{Closest, triangle_distance, triangle_distance_with};
 pub(crate) use winding::{AxisRay, Passing};
 pub(crate) use within::{triangles_below, triangles_within};
 

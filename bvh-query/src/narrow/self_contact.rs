@@ -10,7 +10,7 @@
 //! meets the other. In general position, the signs of the heights of the other corners tell that: seen from the apex, the
 //! opposite edges are arcs on a sphere, and either they cross or one crosses the antipode of the other.
 
-use super::intersect::{are_collinear, area, area_axis, heights, lexicographic};
+use super::intersection::{are_collinear, area, area_axis, heights, lexicographic};
 use super::{Point, Triangle, segment_intersects, triangles_intersect};
 
 /// How two triangles of one mesh meet, by the corners that they have in common. The command and the bindings of other

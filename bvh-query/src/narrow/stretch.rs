@@ -2,7 +2,7 @@
 //!
 //! Two convex bodies meet exactly if their projections on every axis meet. If one of them moves on a line, each axis leaves an
 //! interval of the way, and the contact is what all intervals have in common. The differences of the points of two triangles
-//! form a body with facets along eleven axes, two normals and nine products of edges, as in [`crate::leaf::collide`]. Triangles
+//! form a body with facets along eleven axes, two normals and nine products of edges, as in [`crate::leaf::separating_axes`]. Triangles
 //! in parallel planes have no body; the axes in their plane take the place of the products, and the coordinate axes bound
 //! triangles without area.
 //!

@@ -10,7 +10,7 @@
 //! Seen along the axis, the problem is two-dimensional: signs are those of `orient2d` and, for the triangles that the
 //! ray's line meets, of one `orient3d`. Both are exact under the precondition of [`narrow`](super).
 
-use super::intersect::{area, triangles_intersect, volume};
+use super::intersection::{area, triangles_intersect, volume};
 use super::{Point, Triangle};
 
 /// A ray along an axis of the frame.

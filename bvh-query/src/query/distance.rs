@@ -10,10 +10,10 @@ use crate::query::answers::{Distance, QueryStats};
 use crate::query::bounding_volumes::sphere_gap;
 use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
+use crate::query::pair_search::{BestPair, Finalists, NearestPairs, PairSearch, ids};
 use crate::query::placed_pair::{FoundPair, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::{limit_of_cores, sum_of_radii};
-use crate::query::search::{BestPair, Finalists, NearestPairs, PairSearch, ids};
 
 impl Querier {
     /// Returns the least distance of the meshes, with B placed by `pose` in A's frame, both closest points and their

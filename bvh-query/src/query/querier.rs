@@ -7,8 +7,8 @@ use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
 use crate::query::answers::QueryStats;
 use crate::query::exact::RecentTriangles;
+use crate::query::pair_search::BoundedPair;
 use crate::query::probe::bounded::BoundedTriangle;
-use crate::query::search::BoundedPair;
 use crate::traverse::budget::Budget;
 use crate::traverse::walk_memory::WalkMemory;
 

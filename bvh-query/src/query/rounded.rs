@@ -9,9 +9,9 @@ use crate::file::shape::Shape;
 use crate::pose::Pose;
 use crate::query::answers::Distance;
 use crate::query::options::DistanceOptions;
+use crate::query::pair_search::PairSearch;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::querier::Querier;
-use crate::query::search::PairSearch;
 
 /// Returns how far apart two cores may be for the shapes to touch.
 pub(crate) fn sum_of_radii(a: Shape<'_>, b: Shape<'_>) -> f64 {

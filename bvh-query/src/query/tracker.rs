@@ -28,10 +28,10 @@ use crate::query::displacement::{displacement, size};
 use crate::query::distance::no_answer;
 use crate::query::exact::{TriangleDistance, placed, stored};
 use crate::query::options::{DistanceOptions, check_distance};
+use crate::query::pair_search::PairSearch;
 use crate::query::placed_pair::FoundPair;
 use crate::query::querier::Querier;
 use crate::query::rounded::limit_of_cores;
-use crate::query::search::PairSearch;
 
 /// Reuses the last answers about two meshes, so that an answer about a nearby pose costs less.
 ///

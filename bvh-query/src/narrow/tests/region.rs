@@ -2,7 +2,7 @@
 //! occur, and near contact, for planes that hardly cross, slivers, and triangles far from the origin.
 
 use super::generate::{KINDS, float, grid_triangle, pair, shuffled, small, triangle};
-use crate::narrow::region::{Region, common_region, unit_normal};
+use crate::narrow::contact_region::{Region, common_region, unit_normal};
 use crate::narrow::{Point, Triangle, add_scaled, dot};
 use crate::numerics::UNIT_ROUNDOFF;
 use cbvh_testkit::Random;

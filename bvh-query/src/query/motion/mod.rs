@@ -21,13 +21,13 @@
 //! triangles, they are kept for the parts of the interval. All other pairs are apart during the whole interval, so
 //! these pairs alone decide. Filters therefore do not affect answers, which have the same bits on every backend.
 
-mod pairs;
-mod question;
-mod search;
+mod cells;
+mod limits;
 mod sweep;
+mod swept_pairs;
 
-pub(crate) use question::{Measures, default_tolerance, radius, size_of};
-pub(crate) use search::Earliest;
+pub(crate) use cells::Earliest;
+pub(crate) use limits::{Measures, default_tolerance, radius, size_of};
 
 use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
@@ -35,10 +35,10 @@ use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::answers::Distance;
 use crate::query::options::{DistanceOptions, check};
+use crate::query::pair_search::PairSearch;
 use crate::query::querier::Querier;
-use crate::query::search::PairSearch;
-use question::Question;
-use search::{Outcome, TimeSearch};
+use cells::{Outcome, TimeSearch};
+use limits::Question;
 
 /// What counts as a hit, and how exactly time is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -7,18 +7,18 @@
 //! direction that turns with B would not do, even if it separates both parts at both ends.
 //!
 //! Nodes are separated along A's directions, by slabs that contain B's slabs at both ends. Pairs of triangles are
-//! separated 16 at a time, by their boxes, normals, centroids and closest points ([`crate::leaf::distance`]).
+//! separated 16 at a time, by their boxes, normals, centroids and closest points ([`crate::leaf::pair_bounds`]).
 
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::Isa;
-use crate::leaf::distance::{swept_bounds, swept_near};
 use crate::leaf::local::{Local, valid_lanes};
+use crate::leaf::pair_bounds::{swept_bounds, swept_near};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::query::answers::QueryStats;
 use crate::query::exact::stored;
-use crate::query::motion::pairs::{CountApart, Sweep, SweptPair};
+use crate::query::motion::swept_pairs::{CountApart, Sweep, SweptPair};
 use crate::query::placed_pair::{PlacedPair, Walk};
 use crate::query::querier::Querier;
 use crate::traverse::node_filter::Measure;

@@ -1,7 +1,7 @@
 //! Where the closest surface to a point is.
 //!
 //! Triangles are bounded in f32, up to sixteen at a time. Those that may be the closest are kept, and measured in f64
-//! at the end, nearest first. Pruning is strict, as in [`crate::query::search`], so the answer does not depend on the
+//! at the end, nearest first. Pruning is strict, as in [`crate::query::pair_search`], so the answer does not depend on the
 //! order of visits.
 
 use crate::error::{NumberError, QueryError};
@@ -10,7 +10,7 @@ use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
 use crate::isa::{Isa, Lanes, Task};
 use crate::leaf::frame::scale_of;
-use crate::leaf::point::{LocalPoint, point_bounds};
+use crate::leaf::point_bounds::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_below, triangles_within};
 use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::pose::Pose;

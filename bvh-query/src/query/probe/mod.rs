@@ -1,13 +1,13 @@
 //! Questions about points, rays and segments. Each is a visitor of the walk of one tree.
 
-#[cfg(feature = "parallel")]
-pub(crate) mod batch;
 pub(in crate::query) mod bounded;
 pub(crate) mod closest;
 pub(crate) mod line;
 mod near;
 pub(crate) mod placed;
 pub(crate) mod point;
+#[cfg(feature = "parallel")]
+pub(crate) mod probe_batch;
 pub(crate) mod ray;
 pub(super) mod relation;
 pub(crate) mod segment;

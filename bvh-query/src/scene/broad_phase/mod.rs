@@ -11,18 +11,18 @@
 
 mod by_key;
 mod least_first;
-mod pairs;
+mod near_pairs;
 mod tree;
 
 pub(super) use by_key::ByKey;
-pub(super) use pairs::NearestFirst;
+pub(super) use near_pairs::NearestFirst;
 
 use crate::error::QueryError;
 use crate::isa::Backend;
 use crate::scene::groups::Groups;
 use crate::scene::world_box::WorldBox;
 use crate::traverse::budget::Budget;
-use pairs::NearPairs;
+use near_pairs::NearPairs;
 use std::ops::ControlFlow;
 use tree::{Child, Tree};
 

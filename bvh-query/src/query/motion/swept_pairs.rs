@@ -9,7 +9,7 @@ use crate::narrow::{
 };
 use crate::pose::Pose;
 use crate::query::exact::placed;
-use crate::query::motion::question::{Question, TimeSpan};
+use crate::query::motion::limits::{Question, TimeSpan};
 use crate::query::querier::Querier;
 use std::rc::Rc;
 

@@ -1,6 +1,6 @@
 //! Bounds on the distances of a point from the triangles of up to four packets.
 //!
-//! As for pairs of triangles ([`crate::leaf::distance`]), the closest point is guessed in plain f32, and the guess is
+//! As for pairs of triangles ([`crate::leaf::pair_bounds`]), the closest point is guessed in plain f32, and the guess is
 //! certified by projections on the line from it: a point is a triangle whose corners are the same.
 //!
 //! The point is the origin, and the unit is a power of two that makes the farthest corner of the mesh about 1 away. Each
@@ -9,12 +9,12 @@
 //! Error: let m bound the coordinates of a triangle as the point sees it. The difference from the high part is rounded to
 //! within u (m + |low|), the sum with the low part to within u m; both by less than 2^-140 more where they underflow. The low
 //! part is off by u |low| <= u^2 |p|. So each coordinate is within e = 2u m + 3u^2 |p| + 2^-140 + that of p in f64, which is
-//! at most `error`, and so is 3u^2 |p| / 4. Bounds are within 4e, as in [`crate::leaf::distance`]. Combinations of corners
+//! at most `error`, and so is 3u^2 |p| / 4. Bounds are within 4e, as in [`crate::leaf::pair_bounds`]. Combinations of corners
 //! round by at most 14u m, and by 4u m more where rounded weights leave the triangle: 32u m is charged.
 
 use crate::isa::{Isa, Lanes};
-use crate::leaf::distance::{Bounds, Guess, certify, clamp, inverse_squares, points_on_face};
 use crate::leaf::math::{Corners, Vec3, along, dot, edges, largest_of, min3, project};
+use crate::leaf::pair_bounds::{Bounds, Guess, certify, clamp, inverse_squares, points_on_face};
 use crate::numerics::{COORDINATE_UNDERFLOW, U};
 use bvh_format::leaf::Packet;
 

@@ -117,7 +117,7 @@ impl Ray {
         if (0..3).all(|k| {
             ahead[k] - self.origin[k] == self.direction[k] && ahead[k] - self.direction[k] == self.origin[k]
         }) {
-            return super::intersect::volume(self.origin, ahead, p, q);
+            return super::intersection::volume(self.origin, ahead, p, q);
         }
         let exact = Integers::new(self, &[p, q, q]);
         sign(&dot_exactly(&exact.direction, &cross_exactly(&exact.corners[0], &exact.corners[1])))

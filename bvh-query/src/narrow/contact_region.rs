@@ -16,10 +16,10 @@
 //! The ends of an edge are sorted first. So the two triangles at an edge give the same bits for the point where it meets a
 //! third one.
 
-use super::distance::{longest, perpendicular_normal, times};
 use super::integers::{cross as cross_exactly, dot as dot_exactly, exponent, integer, minus, quotient};
-use super::intersect::{Aligned, Hull, Plane, are_collinear, area, area_axis, heights, lexicographic};
-use super::intersect::{triangle_contains, volume};
+use super::intersection::{Aligned, Hull, Plane, are_collinear, area, area_axis, heights, lexicographic};
+use super::intersection::{triangle_contains, volume};
+use super::triangle_distance::{longest, perpendicular_normal, times};
 use super::{Point, Triangle, dot, negated, reciprocal_exponent, subtract};
 use crate::numerics::UNIT_ROUNDOFF;
 use num_bigint::BigInt;

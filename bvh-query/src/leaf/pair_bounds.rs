@@ -308,10 +308,10 @@ mod tests {
     use super::*;
     use crate::file::place::LeafPacket;
     use crate::isa::{Backend, Task};
-    use crate::leaf::collide::{Sides, face_planes};
     use crate::leaf::frame::LocalFrame;
     use crate::leaf::placed_packet::PlacedPacket;
     use crate::leaf::queue::TrianglePair;
+    use crate::leaf::separating_axes::{Sides, face_planes};
     use bvh_format::leaf::Packet;
 
     const LEAF: LeafPacket = LeafPacket { page: 0, packet: 0, triangles: 4 };

@@ -8,8 +8,8 @@
 use crate::error::QueryError;
 use crate::file::place::LeafPacket;
 use crate::isa::Isa;
-use crate::leaf::distance::{bounds, near, near_along};
 use crate::leaf::local::valid_lanes;
+use crate::leaf::pair_bounds::{bounds, near, near_along};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::{Closest, triangles_intersect, triangles_within};

@@ -6,8 +6,8 @@
 //! the bounds. The general routine is only needed for the search for a better lower bound, which is rare.
 
 use super::candidates::{self as vectors, Foot, Vectors, everywhere};
-use super::distance::{Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, perpendicular_part};
-use super::intersect::triangle_contains;
+use super::intersection::triangle_contains;
+use super::triangle_distance::{Closest, MAX_ERROR_ASYMMETRY, Placed, certified_gap, perpendicular_part};
 use super::{Point, Triangle, add_scaled, dot, largest_of, negated, reciprocal_exponent, triangle_distance};
 use crate::isa::Isa;
 use crate::isa::corners::Corners;

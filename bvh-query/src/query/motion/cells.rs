@@ -18,9 +18,9 @@
 use crate::error::{NumberError, QueryError};
 use crate::pose::Pose;
 use crate::query::displacement::displacement;
-use crate::query::motion::pairs::{Kept, Sweep};
-use crate::query::motion::question::{MAX_DEPTH, Middle, Question, TimeSpan};
+use crate::query::motion::limits::{MAX_DEPTH, Middle, Question, TimeSpan};
 use crate::query::motion::sweep::Room;
+use crate::query::motion::swept_pairs::{Kept, Sweep};
 use crate::query::placed_pair::each_pair;
 use crate::query::querier::Querier;
 use std::collections::VecDeque;
@@ -448,7 +448,7 @@ mod tests {
     use crate::isa::Backend;
     use crate::motion::Motion;
     use crate::query::motion::MotionOptions;
-    use crate::query::motion::pairs::SweptPair;
+    use crate::query::motion::swept_pairs::SweptPair;
     use bvh_bake::mesh::Mesh;
 
     type Triangle = [[f64; 3]; 3];

@@ -16,7 +16,7 @@ use crate::query::querier::Querier;
 use crate::scene::attachments::Table;
 use crate::scene::contents::reach_of;
 use crate::scene::instance::{Instance, InstanceId};
-use crate::scene::question::{MAX_KNOWN_PAIRS, ScenePair};
+use crate::scene::pair_questions::{MAX_KNOWN_PAIRS, ScenePair};
 use crate::scene::world_box::WorldBox;
 use crate::scene::{Scene, SceneError};
 use std::ops::ControlFlow;

@@ -4,7 +4,7 @@
 //! seen from a point of the line: see [`crate::narrow::Ray`]. Two opposite signs that are certain show that the line
 //! misses the triangle.
 //!
-//! Error: a point of the line near the packets is the origin, in the frame of [`crate::leaf::point`]. Let m bound the
+//! Error: a point of the line near the packets is the origin, in the frame of [`crate::leaf::point_bounds`]. Let m bound the
 //! coordinates of a triangle there, and u = 2^-24. A coordinate is off by at most d = 2u m + e, with e what
 //! [`LocalPoint`] charges. A component of the cross product is then off by 4 m d + 2 d^2 + 4u m^2. A component of w is
 //! off by u, as none is beyond 1. The three products and their sums add 24u m^2. Together that is at most 12 m d + 6
@@ -12,7 +12,7 @@
 
 use crate::isa::{Isa, Lanes};
 use crate::leaf::math::{cross, dot, largest_of};
-use crate::leaf::point::LocalPoint;
+use crate::leaf::point_bounds::LocalPoint;
 use crate::numerics::{SIGN_UNDERFLOW, U};
 use bvh_format::leaf::Packet;
 
