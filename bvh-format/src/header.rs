@@ -202,14 +202,28 @@ pub(crate) fn read_header(bytes: &[u8], length: u64) -> Result<(Header, Vec<Sect
     ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;
     let (entries, _) = <[SectionEntry]>::ref_from_prefix_with_elems(rest, count)
         .map_err(|_| FormatError::new(Rule::SectionCount, 12, "a table within the file", count))?;
-    let unsummed = Header { header_checksum: 0.into(), ..header };
-    let mut hasher = Hasher::default();
-    hasher.update(unsummed.as_bytes());
-    hasher.update(entries.as_bytes());
-    require(Rule::HeaderChecksum, 32, hex(header.header_checksum.get()), hex(hasher.finish()))?;
+    let sum = head_checksum(&header, entries);
+    require(Rule::HeaderChecksum, 32, hex(header.header_checksum.get()), hex(sum))?;
     require(Rule::FileLength, 16, header.file_length.get(), length)?;
     let sections = read_entries(entries, usize::try_from(length).unwrap_or(usize::MAX))?;
     Ok((header, sections))
+}
+
+/// Returns the checksum of a head, which counts its own checksum as 0.
+pub(crate) fn head_checksum(header: &Header, entries: &[SectionEntry]) -> u64 {
+    let unsummed = Header { header_checksum: 0.into(), ..*header };
+    let mut hasher = Hasher::default();
+    hasher.update(unsummed.as_bytes());
+    hasher.update(entries.as_bytes());
+    hasher.finish()
+}
+
+/// Returns the header and the section table of a file to change them; `None` if it is shorter than they are.
+pub(crate) fn head_mut(file: &mut [u8]) -> Option<(&mut Header, &mut [SectionEntry])> {
+    let (header, rest) = Header::mut_from_prefix(file).ok()?;
+    let (entries, _) =
+        <[SectionEntry]>::mut_from_prefix_with_elems(rest, header.sections.get() as usize).ok()?;
+    Some((header, entries))
 }
 
 fn read_entries(entries: &[SectionEntry], file_length: usize) -> Result<Vec<Section>, FormatError> {

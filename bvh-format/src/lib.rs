@@ -73,7 +73,7 @@ pub mod page;
 pub mod profile;
 pub mod quantize;
 pub mod realign;
-pub mod restate;
+pub mod rewrite_rounding;
 mod rule;
 pub mod slabs;
 pub mod source;

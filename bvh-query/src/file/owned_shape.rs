@@ -3,7 +3,7 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::shape::{Shape, check_radius, rounding};
-use bvh_format::restate::with_rounding;
+use bvh_format::rewrite_rounding::with_rounding;
 use std::borrow::Cow;
 
 /// A [`Shape`] that keeps its file open. Use it for one object that outlives the code that opened its file; for all

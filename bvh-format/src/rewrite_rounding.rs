@@ -2,7 +2,7 @@
 
 use crate::checksum::checksum;
 use crate::error::FormatError;
-use crate::header::{SectionKind, head_bytes};
+use crate::header::{SectionKind, head_checksum, head_mut};
 use crate::layout::{ContentHasher, Layout};
 use crate::object::{ObjectRecord, TABLE_HEAD};
 use std::mem::offset_of;
@@ -35,18 +35,14 @@ pub fn with_rounding(bytes: &[u8], radius: f64, solid: bool) -> Result<Vec<u8>, 
         content.begin(section.kind, section.range.len() as u64);
         content.update(&file[section.range.clone()]);
     }
-    // Section 2 of the specification states these places.
-    let count = u32::from_le_bytes([file[12], file[13], file[14], file[15]]) as usize;
-    let (table, head) = (head_bytes(0), head_bytes(count));
-    for entry in file[table..head].as_chunks_mut::<32>().0 {
-        if entry[..4] == (SectionKind::Objects as u32).to_le_bytes() {
-            entry[24..].copy_from_slice(&sum.to_le_bytes());
+    // A file that has been read has a head.
+    if let Some((header, entries)) = head_mut(&mut file) {
+        for entry in entries.iter_mut().filter(|entry| entry.kind.get() == SectionKind::Objects as u32) {
+            entry.checksum = sum.into();
         }
+        header.content_checksum = content.finish().into();
+        header.header_checksum = head_checksum(header, entries).into();
     }
-    file[24..32].copy_from_slice(&content.finish().to_le_bytes());
-    file[32..40].fill(0);
-    let sum = checksum(&file[..head]);
-    file[32..40].copy_from_slice(&sum.to_le_bytes());
     Layout::read(&file)?;
     Ok(file)
 }
