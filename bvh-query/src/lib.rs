@@ -97,25 +97,29 @@ pub use file::shape::Shape;
 pub use isa::floats;
 pub use isa::{Backend, BackendError};
 pub use motion::{Motion, PathError, Polyline, RelativePath, RigidPath};
+pub use narrow::SelfContactKind;
 pub use pose::{Pose, PoseError};
-pub use query::answers::{
-    ClosestPoint, Contact, Distance, QueryStats, RayHit, Relation, SelfContact, SelfContactKind, Side,
-    SignedDistance,
-};
 #[cfg(feature = "parallel")]
 pub use query::batch::Batch;
+pub use query::contacts::Contact;
 pub use query::depth::clash::{Clash, ClashClass, ClashOptions};
 pub use query::depth::penetration::{Penetration, PenetrationOptions, Separation};
 pub use query::displacement::displacement;
+pub use query::distance::Distance;
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;
 pub use query::patches::{Patch, PatchOptions, Patches};
+pub use query::probe::closest::ClosestPoint;
 pub use query::probe::placed::PlacedShape;
 #[cfg(feature = "parallel")]
 pub use query::probe::probe_batch::ProbeBatch;
-pub use query::probe::ray::Ray;
+pub use query::probe::ray::{Ray, RayHit};
+pub use query::probe::relation::Relation;
+pub use query::probe::side::{Side, SignedDistance};
 pub use query::querier::Querier;
 pub use query::regions::{ContactRegion, ContactRegions, RegionKind};
+pub use query::self_contacts::SelfContact;
+pub use query::stats::QueryStats;
 pub use query::tracker::Tracker;
 pub use scene::{
     Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact,

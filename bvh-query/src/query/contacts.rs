@@ -5,7 +5,6 @@ use crate::file::shape::Shape;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::numerics::round_up;
 use crate::pose::Pose;
-use crate::query::answers::{Contact, QueryStats};
 use crate::query::bounding_volumes::{sphere_gap, surely_apart};
 use crate::query::collide::{Candidates, ContactVisitor};
 use crate::query::options::DistanceOptions;
@@ -13,6 +12,7 @@ use crate::query::pair_search::{EachWithin, Finalists, NearestPairs, PairSearch,
 use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
+use crate::query::stats::QueryStats;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
@@ -23,6 +23,19 @@ use std::ops::ControlFlow;
 
 /// What is done with a contact and the pair of stored triangles that it is about.
 pub(super) type Report<'a> = &'a mut dyn FnMut(Contact, TrianglePair) -> ControlFlow<()>;
+
+/// A pair of triangles in contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Contact {
+    /// The number that the object of A has in its file.
+    pub object_a: u32,
+    /// The triangle of A: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle_a: u32,
+    /// The number that the object of B has in its file.
+    pub object_b: u32,
+    /// The triangle of B.
+    pub triangle_b: u32,
+}
 
 impl Querier {
     /// Returns all pairs of triangles in contact, in ascending order.

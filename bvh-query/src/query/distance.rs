@@ -6,14 +6,60 @@ use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::leaf::queue::TrianglePair;
 use crate::pose::Pose;
-use crate::query::answers::{Distance, QueryStats};
 use crate::query::bounding_volumes::sphere_gap;
 use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
 use crate::query::pair_search::{BestPair, Finalists, NearestPairs, PairSearch, ids};
 use crate::query::placed_pair::{FoundPair, PlacedPair, Walk, each_pair};
 use crate::query::querier::Querier;
-use crate::query::rounded::{limit_of_cores, sum_of_radii};
+use crate::query::rounded::{between, limit_of_cores, sum_of_radii};
+use crate::query::stats::QueryStats;
+
+/// The least distance of two shapes. For shapes with radii, `triangle_a` and `triangle_b` are those of the cores, and the points
+/// are on the rounded surfaces; where the shapes touch, both are one common point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Distance {
+    /// The distance in mesh units; 0 if and only if the meshes touch.
+    pub distance: f64,
+    /// A certified lower bound: the two triangles named here are at least this far apart. If the query allowed an
+    /// error, no two triangles of the meshes are nearer. Exact arithmetic, not this bound, decides whether the meshes
+    /// touch.
+    pub lower: f64,
+    /// A certified upper bound: the two triangles, and so the meshes, are at most this far apart.
+    pub upper: f64,
+    /// The closest point on A, in A's frame.
+    pub point_a: [f64; 3],
+    /// The closest point on B, in A's frame.
+    pub point_b: [f64; 3],
+    /// The number that the object of A has in its file.
+    pub object_a: u32,
+    /// The triangle of A with the closest point: its number in the input.
+    pub triangle_a: u32,
+    /// The number that the object of B has in its file.
+    pub object_b: u32,
+    /// The triangle of B with the closest point.
+    pub triangle_b: u32,
+}
+
+impl BestPair {
+    /// Returns the pair as an answer, given `PairSearch::proved`.
+    pub(super) fn distance(&self, proved: f64) -> Distance {
+        let lower = if self.closest.distance == 0.0 { 0.0 } else { proved };
+        let (object_a, object_b) = self.found.numbers;
+        Distance {
+            distance: self.closest.distance,
+            lower,
+            upper: self.closest.upper,
+            point_a: self.closest.point_a,
+            point_b: self.closest.point_b,
+            object_a,
+            triangle_a: self.ids.0,
+            object_b,
+            triangle_b: self.ids.1,
+        }
+    }
+}
 
 impl Querier {
     /// Returns the least distance of the meshes, with B placed by `pose` in A's frame, both closest points and their
@@ -82,6 +128,52 @@ impl Querier {
         search.limit_to(limit_of_cores(a, b, limit).next_up());
         let best = self.nearest(a, b, pose, &mut search)?;
         best.map(|best| self.distance_of_shapes(a, b, pose, best.distance(search.proved()))).transpose()
+    }
+
+    /// Turns the distance of two cores into that of the shapes.
+    pub(super) fn distance_of_shapes(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        core: Distance,
+    ) -> Result<Distance, QueryError> {
+        let sum = sum_of_radii(a, b);
+        let meet_at = |point| Distance {
+            distance: 0.0,
+            lower: 0.0,
+            upper: 0.0,
+            point_a: point,
+            point_b: point,
+            ..core
+        };
+        if sum > 0.0 {
+            let near = core.upper <= sum || core.lower <= sum && self.cores_within(a, b, pose, sum)?;
+            if near {
+                // At most as far from either core as the radius there.
+                return Ok(meet_at(between(core.point_a, core.point_b, a.radius() / sum)));
+            }
+        }
+        if core.distance == 0.0 {
+            return Ok(core);
+        }
+        if let Some(point) = self.inside_point(a, b, pose)? {
+            return Ok(meet_at(point));
+        }
+        if sum == 0.0 {
+            return Ok(core);
+        }
+        // The shapes do not touch, so the distance must not round to zero.
+        let distance = (core.distance - sum).max(f64::MIN_POSITIVE);
+        let share = |radius: f64| (radius / core.distance).min(1.0);
+        Ok(Distance {
+            distance,
+            lower: (core.lower - sum).next_down().clamp(0.0, distance),
+            upper: (core.upper - sum).next_up().max(distance),
+            point_a: between(core.point_a, core.point_b, share(a.radius())),
+            point_b: between(core.point_b, core.point_a, share(b.radius())),
+            ..core
+        })
     }
 
     /// Returns the closest pair of triangles within the limit of `search`; of touching meshes, the first contact.

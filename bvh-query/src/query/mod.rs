@@ -2,15 +2,14 @@
 //! `self_contacts` walks trees of packets, and `relation` and `patches` are made of other queries. Queries about points, rays and
 //! segments (`probe`) are visitors of the walk of one tree.
 
-pub(crate) mod answers;
 #[cfg(feature = "parallel")]
 pub(crate) mod batch;
 mod bounding_volumes;
 mod collide;
-mod contacts;
+pub(crate) mod contacts;
 pub(crate) mod depth;
 pub(crate) mod displacement;
-mod distance;
+pub(crate) mod distance;
 mod exact;
 pub(crate) mod motion;
 pub(crate) mod options;
@@ -21,5 +20,6 @@ pub(crate) mod probe;
 pub(crate) mod querier;
 pub(crate) mod regions;
 pub(crate) mod rounded;
-mod self_contacts;
+pub(crate) mod self_contacts;
+pub(crate) mod stats;
 pub(crate) mod tracker;

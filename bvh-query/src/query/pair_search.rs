@@ -14,10 +14,10 @@ use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::narrow::{Closest, triangles_intersect, triangles_within};
 use crate::numerics::{SLACK, round_up};
-use crate::query::answers::{Distance, QueryStats};
 use crate::query::exact::TriangleDistance;
 use crate::query::options::DistanceOptions;
 use crate::query::placed_pair::{FoundPair, PlacedPair, VisitPair};
+use crate::query::stats::QueryStats;
 use crate::traverse::node_filter::Measure;
 use crate::traverse::walk::{Order, Visitor};
 use std::ops::ControlFlow;
@@ -48,25 +48,6 @@ pub(super) struct BestPair {
 pub(super) fn ids(placed: &PlacedPair<'_>, pair: &TrianglePair) -> Result<(u32, u32), QueryError> {
     let (a, b) = (&placed.pair.object_a, &placed.pair.object_b);
     Ok((placed.pair.bvh_a.triangle_id(a, pair.place_a())?, placed.pair.bvh_b.triangle_id(b, pair.place_b())?))
-}
-
-impl BestPair {
-    /// Returns the pair as an answer, given `PairSearch::proved`.
-    pub(super) fn distance(&self, proved: f64) -> Distance {
-        let lower = if self.closest.distance == 0.0 { 0.0 } else { proved };
-        let (object_a, object_b) = self.found.numbers;
-        Distance {
-            distance: self.closest.distance,
-            lower,
-            upper: self.closest.upper,
-            point_a: self.closest.point_a,
-            point_b: self.closest.point_b,
-            object_a,
-            triangle_a: self.ids.0,
-            object_b,
-            triangle_b: self.ids.1,
-        }
-    }
 }
 
 /// What is known of the distance so far, over all pairs of objects.

@@ -5,10 +5,10 @@ use crate::file::shape::Shape;
 use crate::isa::{Backend, BackendError};
 use crate::leaf::placed_packet::PlacedPackets;
 use crate::leaf::queue::TriangleQueue;
-use crate::query::answers::QueryStats;
 use crate::query::exact::RecentTriangles;
 use crate::query::pair_search::BoundedPair;
 use crate::query::probe::bounded::BoundedTriangle;
+use crate::query::stats::QueryStats;
 use crate::traverse::budget::Budget;
 use crate::traverse::walk_memory::WalkMemory;
 

@@ -5,7 +5,7 @@ use crate::file::shape::Shape;
 use crate::leaf::queue::TrianglePair;
 use crate::narrow::{Closest, MAX_POINTS, Triangle, common_region, unit, unit_normal};
 use crate::pose::Pose;
-use crate::query::answers::Contact;
+use crate::query::contacts::Contact;
 use crate::query::exact::{TriangleDistance, placed, stored_at};
 use crate::query::querier::Querier;
 use crate::query::rounded::{between, sum_of_radii};

@@ -7,7 +7,6 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::pose::Pose;
-use crate::query::answers::Distance;
 use crate::query::options::DistanceOptions;
 use crate::query::pair_search::PairSearch;
 use crate::query::probe::placed::PlacedShape;
@@ -72,52 +71,6 @@ impl Querier {
             found = self.first_inside(&placed, &own)?;
         }
         Ok(found)
-    }
-
-    /// Turns the distance of two cores into that of the shapes.
-    pub(super) fn distance_of_shapes(
-        &mut self,
-        a: Shape<'_>,
-        b: Shape<'_>,
-        pose: &Pose,
-        core: Distance,
-    ) -> Result<Distance, QueryError> {
-        let sum = sum_of_radii(a, b);
-        let meet_at = |point| Distance {
-            distance: 0.0,
-            lower: 0.0,
-            upper: 0.0,
-            point_a: point,
-            point_b: point,
-            ..core
-        };
-        if sum > 0.0 {
-            let near = core.upper <= sum || core.lower <= sum && self.cores_within(a, b, pose, sum)?;
-            if near {
-                // At most as far from either core as the radius there.
-                return Ok(meet_at(between(core.point_a, core.point_b, a.radius() / sum)));
-            }
-        }
-        if core.distance == 0.0 {
-            return Ok(core);
-        }
-        if let Some(point) = self.inside_point(a, b, pose)? {
-            return Ok(meet_at(point));
-        }
-        if sum == 0.0 {
-            return Ok(core);
-        }
-        // The shapes do not touch, so the distance must not round to zero.
-        let distance = (core.distance - sum).max(f64::MIN_POSITIVE);
-        let share = |radius: f64| (radius / core.distance).min(1.0);
-        Ok(Distance {
-            distance,
-            lower: (core.lower - sum).next_down().clamp(0.0, distance),
-            upper: (core.upper - sum).next_up().max(distance),
-            point_a: between(core.point_a, core.point_b, share(a.radius())),
-            point_b: between(core.point_b, core.point_a, share(b.radius())),
-            ..core
-        })
     }
 }
 

@@ -6,16 +6,32 @@ use crate::file::shape::Shape;
 use crate::isa::{Isa, Task};
 use crate::leaf::self_packet::{SelfFrame, SelfPacket};
 use crate::narrow::{SelfContactKind, Triangle, self_contact};
-use crate::query::answers::{QueryStats, SelfContact};
 use crate::query::contacts::{ids_repeat, max_triangles};
 use crate::query::exact::{RecentTriangles, stored};
 use crate::query::querier::Querier;
+use crate::query::stats::QueryStats;
 use crate::traverse::budget::Budget;
 use crate::traverse::packet_tree::{PacketTree, PacketVisitor};
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
 use bvh_format::validate::packets;
 use std::ops::ControlFlow;
+
+/// Two triangles of one mesh that meet where they should not: see [`Querier::self_contacts`](crate::Querier::self_contacts).
+/// The object and the triangle of A are before those of B.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SelfContact {
+    /// The number that the object of the first triangle has in the file.
+    pub object_a: u32,
+    /// The first triangle: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle_a: u32,
+    /// The number that the object of the second triangle has in the file.
+    pub object_b: u32,
+    /// The second triangle.
+    pub triangle_b: u32,
+    /// How they meet.
+    pub kind: SelfContactKind,
+}
 
 impl Querier {
     /// Returns all pairs of triangles of a shape that meet where they should not, in ascending order.

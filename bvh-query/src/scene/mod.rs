@@ -32,7 +32,7 @@ use crate::file::owned_shape::OwnedShape;
 use crate::file::shape::check_radius;
 use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
-use crate::query::answers::QueryStats;
+use crate::query::stats::QueryStats;
 use contents::{Contents, check_world};
 use instance::Instance;
 use std::sync::Arc;

@@ -10,7 +10,7 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::motion::{AttachedPath, RelativePath, RigidPath, TogetherPath};
-use crate::query::answers::Distance;
+use crate::query::distance::Distance;
 use crate::query::motion::{Earliest, EndedByError, MotionAnswer, MotionOptions, default_tolerance};
 use crate::query::querier::Querier;
 use crate::scene::attachments::Table;

@@ -3,10 +3,12 @@
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::pose::Pose;
-use crate::query::answers::{Contact, Distance, Relation};
+use crate::query::contacts::Contact;
 use crate::query::depth::clash::{Clash, ClashClass, ClashOptions};
 use crate::query::displacement::size;
+use crate::query::distance::Distance;
 use crate::query::options::check_distance;
+use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 use crate::query::tracker::Tracker;
 use crate::scene::broad_phase::NearestFirst;

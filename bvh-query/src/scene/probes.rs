@@ -7,14 +7,17 @@
 use crate::error::QueryError;
 use crate::narrow::Point;
 use crate::numerics::PROBE_ERROR;
-use crate::query::answers::{ClosestPoint, QueryStats, RayHit, Side, SignedDistance};
+use crate::query::probe::closest::ClosestPoint;
 use crate::query::probe::closest::check_within;
 use crate::query::probe::line::{Line, LineQuestion, range_in_box};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
+use crate::query::probe::ray::RayHit;
 use crate::query::probe::ray::{All, Any, First, Ray};
 use crate::query::probe::segment::MeetsSegment;
+use crate::query::probe::side::{Side, SignedDistance};
 use crate::query::querier::Querier;
+use crate::query::stats::QueryStats;
 use crate::scene::instance::InstanceId;
 use crate::scene::world_box::WorldBox;
 use crate::scene::{Scene, SceneError};

@@ -2,8 +2,8 @@
 
 use crate::error::QueryError;
 use crate::isa::Backend;
-use crate::query::answers::QueryStats;
 use crate::query::querier::Querier;
+use crate::query::stats::QueryStats;
 use crate::traverse::budget::Budget;
 use std::fmt;
 use std::ops::Range;

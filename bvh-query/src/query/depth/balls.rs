@@ -7,11 +7,11 @@
 
 use crate::error::QueryError;
 use crate::narrow::{Point, common_region, cross, subtract};
-use crate::query::answers::Side;
 use crate::query::depth::translation::Translation;
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::side::OpenObject;
+use crate::query::probe::side::Side;
 use crate::query::querier::Querier;
 use bvh_format::vec3::length;
 use std::cmp::Ordering;

@@ -3,15 +3,16 @@
 use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
 use crate::pose::Pose;
-use crate::query::answers::{Distance, Relation};
 use crate::query::depth::balls::bounds;
 use crate::query::depth::penetration::{Penetration, PenetrationOptions};
 use crate::query::displacement::{displacement, size};
+use crate::query::distance::Distance;
 use crate::query::exact::{placed, stored_at};
 use crate::query::options::check;
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
+use crate::query::probe::relation::Relation;
 use crate::query::probe::relation::each_triangle;
 use crate::query::querier::Querier;
 use crate::query::rounded::{limit_of_cores, sum_of_radii};

@@ -17,9 +17,10 @@
 use crate::error::QueryError;
 use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
 use crate::numerics::UNIT_ROUNDOFF;
-use crate::query::answers::{Distance, Relation};
 use crate::query::depth::leaving::Leaving;
 use crate::query::depth::translation::Translation;
+use crate::query::distance::Distance;
+use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 
 /// Where a way comes free.

@@ -33,7 +33,7 @@ use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
 use crate::motion::RigidPath;
 use crate::pose::Pose;
-use crate::query::answers::Distance;
+use crate::query::distance::Distance;
 use crate::query::options::{DistanceOptions, check};
 use crate::query::pair_search::PairSearch;
 use crate::query::querier::Querier;

@@ -14,12 +14,12 @@ use crate::leaf::point_bounds::{LocalPoint, point_bounds};
 use crate::narrow::{Closest, Point, point_distance, triangles_below, triangles_within};
 use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::pose::Pose;
-use crate::query::answers::{ClosestPoint, QueryStats};
 use crate::query::exact::{placed, stored};
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::querier::Querier;
+use crate::query::stats::QueryStats;
 use crate::traverse::point_filter::PointFilter;
 use crate::traverse::probe_walk::ProbeVisitor;
 use crate::traverse::walk_memory::WalkMemory;
@@ -37,6 +37,24 @@ struct BestTriangle {
     object: u32,
     /// Ids are read where they matter: of the answer, and of triangles that tie.
     place: TrianglePlace,
+}
+
+/// The closest point of a mesh to a given one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ClosestPoint {
+    /// The distance in mesh units; 0 if and only if the given point is on the mesh.
+    pub distance: f64,
+    /// The mesh is certainly at least this far away.
+    pub lower: f64,
+    /// The mesh is certainly at most this far away.
+    pub upper: f64,
+    /// The closest point, in the mesh's frame.
+    pub point: [f64; 3],
+    /// The number that its object has in the file.
+    pub object: u32,
+    /// Its triangle: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle: u32,
 }
 
 impl Querier {

@@ -9,6 +9,6 @@ pub(crate) mod point;
 #[cfg(feature = "parallel")]
 pub(crate) mod probe_batch;
 pub(crate) mod ray;
-pub(super) mod relation;
+pub(crate) mod relation;
 pub(crate) mod segment;
 pub(crate) mod side;

@@ -5,10 +5,12 @@
 
 use crate::error::QueryError;
 use crate::isa::{Backend, BackendError};
-use crate::query::answers::{ClosestPoint, RayHit, Side, SignedDistance};
+use crate::query::probe::closest::ClosestPoint;
 use crate::query::probe::closest::check_within;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::ray::Ray;
+use crate::query::probe::ray::RayHit;
+use crate::query::probe::side::{Side, SignedDistance};
 use crate::query::querier::Querier;
 use rayon::prelude::*;
 

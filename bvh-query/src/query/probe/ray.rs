@@ -3,7 +3,6 @@
 use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
 use crate::narrow::{self, Crossing, Triangle, rounded_crossing};
-use crate::query::answers::RayHit;
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
@@ -33,6 +32,25 @@ impl Ray {
     pub fn until(self, until: f64) -> Self {
         Self { until, ..self }
     }
+}
+
+/// Where a ray hits a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct RayHit {
+    /// The parameter, in units of the ray's direction; 0 if and only if the ray's origin is on the mesh. Its relative
+    /// error is at most 2^-43.
+    pub t: f64,
+    /// The exact parameter is at least this.
+    pub lower: f64,
+    /// The exact parameter is at most this.
+    pub upper: f64,
+    /// The point, in the frame of the ray.
+    pub point: [f64; 3],
+    /// The number that its object has in the file.
+    pub object: u32,
+    /// Its triangle: its number in the input or, in a file without ids, its place in the order of the leaves.
+    pub triangle: u32,
 }
 
 impl Querier {

@@ -5,17 +5,35 @@ use crate::file::bvh::Bvh;
 use crate::file::place::TrianglePlace;
 use crate::file::shape::Shape;
 use crate::pose::Pose;
-use crate::query::answers::{Relation, Side};
 use crate::query::bounding_volumes::surely_apart;
 use crate::query::exact::stored_at;
 use crate::query::probe::near::near;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::side::OpenObject;
+use crate::query::probe::side::Side;
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::object::Object;
 use bvh_format::validate::packets;
+
+/// How two meshes lie. The command and the bindings of other languages use its numbers: `relation as u8`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Relation {
+    /// Their surfaces have a point in common: [`Querier::collide`](crate::Querier::collide) is true.
+    Touching = 0,
+    /// They have nothing in common, insides included.
+    Apart = 1,
+    /// All of A is inside B.
+    AInB = 2,
+    /// All of B is inside A.
+    BInA = 3,
+    /// Some connected components are inside the other mesh and some are not, or some of each mesh are.
+    Mixed = 4,
+    /// The answer depends on the inside of a mesh that is not closed.
+    Undefined = 5,
+}
 
 impl Querier {
     /// Returns the relation of two meshes, with B placed by a pose in A's frame: whether they touch and, if not,

@@ -6,7 +6,7 @@
 use crate::error::QueryError;
 use crate::file::topology::Topology;
 use crate::narrow::{AxisRay, Passing, Point};
-use crate::query::answers::{ClosestPoint, Side, SignedDistance};
+use crate::query::probe::closest::ClosestPoint;
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::{IntoObject, PlacedShape};
@@ -20,6 +20,42 @@ pub(crate) enum OpenObject {
     Undefined,
     /// It contains nothing.
     Empty,
+}
+
+/// On which side of a mesh a point is. The command and the bindings of other languages use its numbers: `side as i8`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(i8)]
+pub enum Side {
+    /// The point is neither on the surface nor inside.
+    Outside = -1,
+    /// The point is on the surface.
+    On = 0,
+    /// The surface winds around the point.
+    Inside = 1,
+    /// The point is not on the surface, and the mesh has no inside, because it is not closed and consistently oriented.
+    Undefined = 2,
+}
+
+/// The distance of a point from the surface of a mesh, and the side that it is on. Inside overlapping parts of one mesh, the
+/// closest surface may be a face between them: see [`Querier::signed_distance`](crate::Querier::signed_distance).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct SignedDistance {
+    /// The side of the point.
+    pub side: Side,
+    /// The closest point of the surface.
+    pub closest: ClosestPoint,
+}
+
+impl SignedDistance {
+    /// Returns the distance in mesh units, negative inside, or `None` if the mesh has no inside.
+    pub fn value(&self) -> Option<f64> {
+        match self.side {
+            Side::Inside => Some(-self.closest.distance),
+            Side::On | Side::Outside => Some(self.closest.distance),
+            Side::Undefined => None,
+        }
+    }
 }
 
 impl Querier {
