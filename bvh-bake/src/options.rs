@@ -74,9 +74,10 @@ impl Rounding {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
-    /// The treelet profile; `None` chooses the profile with the lowest estimated query cost for each object.
+    /// The treelet profile; `None` chooses the fastest one, or a smaller one if [`Self::triangles`] asks for packed or quantised
+    /// triangles.
     pub profile: Option<Profile>,
-    /// The triangle encoding; `None` chooses `F32` or `Packed`, whichever the cost model prefers.
+    /// The triangle encoding; `None` chooses `F32`, or `Packed` for objects whose plain triangles would be slow to read.
     pub triangles: Option<TriangleEncoding>,
     /// With `Quantized`, the largest distance by which a vertex may move, in mesh units. The default is 1e-5 of the
     /// diagonal of the object's box, and the limit is a hundredth of the diagonal.

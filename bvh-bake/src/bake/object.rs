@@ -7,7 +7,7 @@ use crate::options::{Effort, Options};
 use crate::pages::Style;
 use crate::pages::brick::{EncodedObject, encode_object};
 use crate::prepare::duplicates::Found;
-use crate::prepare::layout_choice::{self, Choice};
+use crate::prepare::layout_choice::{Choice, choose};
 use crate::prepare::quantization::advised_error;
 use crate::prepare::{Measured, Surveyed, measure, survey};
 use crate::storage::Spill;
@@ -112,17 +112,15 @@ impl Built {
         let moved = moved.joined(measured.moved).rounded_up();
         let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
-        let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
+        let triangles = kept.count();
+        let Choice { profile, encoding, reason } = choose(triangles, is_cloud, options);
+        let grid = surveyed.grid.take();
         // Points have no extent, so that finer splits make no better tree of them.
         let effort = if is_cloud { Effort::Fast } else { options.effort };
-        let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, effort, resources)?;
-        let triangles = kept.count();
+        let bricks = Bricks::divide(&kept, &measured.bounds, grid, profile.width(), effort, resources)?;
         drop(stream);
         let origin = behind.are_corrected().then_some(behind.origin);
         let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles, origin));
-        let (tree, of_brick) = bricks.first_tree(resources)?;
-        let Choice { profile, encoding, reason } =
-            layout_choice::choose(triangles, tree, of_brick, is_cloud, options);
         let style = Style {
             profile,
             encoding,

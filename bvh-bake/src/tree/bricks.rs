@@ -299,7 +299,7 @@ mod tests {
         let resources = Resources::unlimited(&progress);
         let tally = progress.tally(Step::Read, 0, 0, 0);
         let spill = resources.scratch.spill();
-        let mut all = BatchStream::empty();
+        let mut all = BatchStream::several(&resources, &[corners.len() as u64], false).remove(0);
         let triangles = corners.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
         all.append(&spill, &Batch::of(triangles.collect::<Vec<_>>())).unwrap();
         all.finish(&spill).unwrap();
