@@ -145,7 +145,6 @@ struct Baker<'a> {
     reason: Option<String>,
     /// The smallest advised error of the objects whose allowed error is coarse.
     advised_max_error: Option<f64>,
-    vertices: u64,
     children: u64,
     treelets: u64,
     /// The number of triangles of the objects so far, and the number of those that are stored.
@@ -173,7 +172,6 @@ impl<'a> Baker<'a> {
             pages: 0,
             reason: None,
             advised_max_error: None,
-            vertices: 0,
             children: 0,
             treelets: 0,
             triangles: 0,
@@ -206,7 +204,7 @@ impl<'a> Baker<'a> {
 
     /// Adds an object after all others.
     fn push(&mut self, object: Built) -> Result<(), BakeError> {
-        let Built { name, mut record, encoded, reason, vertices } = object;
+        let Built { name, mut record, encoded, reason } = object;
         let EncodedObject { pages, packets, treelets, children, topology } = encoded;
         let page_count = pages.page_count();
         if (self.pages + page_count) as u64 > MAX_PAGES {
@@ -224,7 +222,6 @@ impl<'a> Baker<'a> {
         self.reason.get_or_insert(reason);
         self.pages += page_count;
         self.kept += record.triangles.get();
-        self.vertices += vertices;
         self.children += children;
         self.treelets += treelets;
         self.objects.push(pages);
@@ -278,7 +275,6 @@ impl<'a> Baker<'a> {
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
             warnings: Vec::new(),
-            vertices: self.vertices,
             width_inflation: inflation.mean_width(),
             volume_inflation: inflation.mean_volume(),
             mean_children: self.children as f64 / self.treelets as f64,

@@ -101,14 +101,13 @@ pub(super) struct Built {
     pub(super) encoded: EncodedObject,
     /// The reason for the layout.
     pub(super) reason: String,
-    pub(super) vertices: u64,
 }
 
 impl Built {
     pub(super) fn new(prepared: Prepared, shared: &Shared) -> Result<Self, BakeError> {
         let Shared { options, resources, id_count, .. } = *shared;
         let Prepared { gathered, measured, mut surveyed, nets, left_out, .. } = prepared;
-        let Gathered { name, behind, stream, moved, welded, vertices, is_cloud } = gathered;
+        let Gathered { name, behind, stream, moved, welded, is_cloud } = gathered;
         let moved = moved.joined(measured.moved).rounded_up();
         let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
@@ -159,7 +158,7 @@ impl Built {
             scale: behind.scale.into(),
             ..ObjectRecord::new_zeroed()
         };
-        Ok(Self { name, record, encoded, reason, vertices })
+        Ok(Self { name, record, encoded, reason })
     }
 }
 

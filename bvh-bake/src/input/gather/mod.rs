@@ -8,7 +8,6 @@ mod input_order;
 mod mesh;
 mod scene;
 mod solids;
-mod vertex_counter;
 pub(crate) mod weld;
 
 pub(crate) use input_order::InputOrder;
@@ -87,8 +86,6 @@ struct Body {
     /// The largest distance by which rounding on request moved a vertex.
     moved: Moved,
     count: u64,
-    /// The number of distinct vertices.
-    vertices: u64,
     /// Whether all triangles are points.
     is_cloud: bool,
 }
@@ -97,7 +94,7 @@ impl Body {
     fn new() -> Self {
         let (parts, open) = (Vec::new(), Vec::new());
         let (extent, moved) = (Extent::EMPTY, Moved::default());
-        Self { parts, open, parked: None, extent, moved, count: 0, vertices: 0, is_cloud: true }
+        Self { parts, open, parked: None, extent, moved, count: 0, is_cloud: true }
     }
 }
 
@@ -131,11 +128,6 @@ impl<'a> Gatherer<'a> {
 
     pub(crate) fn resources(&self) -> &'a Resources {
         self.resources
-    }
-
-    /// Returns whether the number of distinct vertices is needed.
-    fn counts_vertices(&self) -> bool {
-        self.runs.is_none()
     }
 
     /// Returns the number of triangles so far.
@@ -181,7 +173,7 @@ impl<'a> Gatherer<'a> {
         let (names, left) = match opener.input.format() {
             MeshFormat::Stl => {
                 let (reader, warnings) = (opener.open(WHOLE)?, opener.input.warnings());
-                return stl::read(reader, &mut SolidsForBake::new(self), warnings);
+                return stl::read(reader, &mut SolidsForBake { gatherer: self, object: 0 }, warnings);
             }
             MeshFormat::Ply => {
                 ply::read(open(PLY_BYTES), &mut faces, opener.input)?;
@@ -255,12 +247,6 @@ impl<'a> Gatherer<'a> {
     /// Returns the number of the body of an object.
     fn body_of(&self, object: usize) -> usize {
         if self.split { object } else { 0 }
-    }
-
-    /// Adds to the number of distinct vertices of an object.
-    fn add_vertices(&mut self, object: usize, count: u64) {
-        let body = self.body_of(object);
-        self.bodies[body].vertices += count;
     }
 
     /// Adds triangles to an object. Their ids follow the present ones.
@@ -425,7 +411,6 @@ impl<'a> Gatherer<'a> {
                 stream,
                 moved: moved.joined(body.moved),
                 welded,
-                vertices: body.vertices,
                 is_cloud: body.is_cloud,
             });
         }
