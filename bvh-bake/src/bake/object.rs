@@ -127,7 +127,6 @@ impl Built {
             ids: options.ids,
             is_cloud,
             behind,
-            turning_slabs: options.turning_slabs && profile.has_turning_slabs() && !is_cloud,
         };
         let encoded = encode_object(bricks, style, survey, resources, &shared.spill)?;
         let bounds = bounds_of_vertices(&measured.bounds, &behind);
