@@ -86,11 +86,6 @@ impl Prepared {
         let left_out = duplicates.count();
         Ok(Self { gathered, measured, surveyed, nets, duplicates: Some(duplicates), left_out, advised_error })
     }
-
-    /// Returns the number of triangles, duplicates included.
-    pub(super) fn triangles(&self) -> u64 {
-        self.gathered.stream.count
-    }
 }
 
 /// An object whose pages are made.

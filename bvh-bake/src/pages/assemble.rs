@@ -2,7 +2,6 @@
 
 use crate::error::BakeError;
 use crate::pages::unnumbered::{Numbering, ObjectPages, UnnumberedPages};
-use crate::progress::{Progress, Stage, Step, Tally, WHOLE};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
@@ -42,7 +41,6 @@ pub(crate) fn assemble(
     with_ids: bool,
     provenance: &str,
     output: &mut Output,
-    progress: &Progress,
 ) -> Result<(), BakeError> {
     let Contents { records, objects, instances, duplicates, mut topology, spill } = contents;
     let sum = |bytes: fn(&ObjectPages) -> usize| objects.iter().map(bytes).sum::<usize>();
@@ -64,9 +62,7 @@ pub(crate) fn assemble(
         [with_ids, has_duplicates, !provenance.is_empty(), !instances.is_empty(), topology_bytes > 0];
     let sections = 3 + optional.into_iter().filter(|&is_there| is_there).count();
     output.append(Arc::new(vec![0; head_bytes(sections)]))?;
-    let triangles = records.iter().map(|(_, record)| record.triangles.get()).sum();
-    let tally = progress.tally(Step::Bake(Stage::Encode), WHOLE, triangles, expected);
-    let mut file = Sections { output, table: Vec::new(), content: ContentHasher::default(), tally };
+    let mut file = Sections { output, table: Vec::new(), content: ContentHasher::default() };
     file.section(SectionKind::Objects, lengths[0], |section| section.write(table))?;
     let (mut leaves, mut ids) = (Vec::new(), Vec::new());
     file.section(SectionKind::Nodes, lengths[1], |section| {
@@ -160,9 +156,8 @@ fn in_batches(
 struct Sections<'a> {
     output: &'a mut Output,
     table: Vec<Section>,
-    content: ContentHasher,
     /// The hasher over the bytes of all sections.
-    tally: Tally<'a>,
+    content: ContentHasher,
 }
 
 impl Sections<'_> {
@@ -185,9 +180,8 @@ impl Sections<'_> {
             self.content.begin(kind, length as u64);
         }
         let content = kind.is_content().then_some(&mut self.content);
-        let (output, tally) = (&mut *self.output, &self.tally);
-        let waiting = Vec::new();
-        let mut section = OpenSection { output, checksum: Hasher::default(), content, tally, waiting };
+        let output = &mut *self.output;
+        let mut section = OpenSection { output, checksum: Hasher::default(), content, waiting: Vec::new() };
         write(&mut section)?;
         section.flush()?;
         let checksum = section.checksum.finish();
@@ -204,7 +198,6 @@ struct OpenSection<'a> {
     output: &'a mut Output,
     checksum: Hasher,
     content: Option<&'a mut ContentHasher>,
-    tally: &'a Tally<'a>,
     /// Bytes that are too few to be written yet.
     waiting: Vec<u8>,
 }
@@ -221,8 +214,7 @@ impl OpenSection<'_> {
 
     /// Writes the bytes that wait.
     fn flush(&mut self) -> Result<(), BakeError> {
-        let Self { output, checksum, content, tally, waiting } = self;
-        tally.add(waiting.len() as u64);
+        let Self { output, checksum, content, waiting } = self;
         let bytes = Arc::new(std::mem::take(waiting));
         let hash_content = || {
             if let Some(content) = content {

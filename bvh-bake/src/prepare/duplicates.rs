@@ -9,7 +9,6 @@
 //! times as long.
 
 use crate::error::{BakeError, LimitError};
-use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
 use crate::threads;
@@ -145,28 +144,21 @@ fn drop_single(hashes: &mut Vec<Hashed>) {
 }
 
 /// Finds the places of duplicates from the hashes of all triangles, as one bit per triangle, or no bits at all if there
-/// are no duplicates. Passes the pairs and the nets to `found`. Sorts `run` records at a time. `tally` counts the triangles.
+/// are no duplicates. Passes the pairs and the nets to `found`. Sorts `run` records at a time.
 pub(crate) fn find(
     stream: &TriangleStream,
     mut hashes: Sorter<Hashed>,
     run: usize,
     spill: &Spill,
-    tally: &Tally,
     mut found: impl FnMut(Found) -> Result<(), BakeError>,
 ) -> Result<Vec<u64>, BakeError> {
     let words = stream.count.div_ceil(64) as usize;
     let mut shared: Vec<u64> = Vec::new();
     let mut last: Option<Hashed> = None;
-    let mut visited = 0;
     if let Some(hashes) = hashes.in_memory() {
         drop_single(hashes);
-        tally.add(stream.count);
     }
     hashes.visit(|hashed| {
-        visited += 1;
-        if visited % TRIANGLES_PER_PART == 0 {
-            tally.add(TRIANGLES_PER_PART as u64);
-        }
         if let Some(last) = last.filter(|last| last.hash() == hashed.hash()) {
             shared.resize(words, 0);
             [last.place(), hashed.place()].into_iter().for_each(|place| set(&mut shared, place));
@@ -236,7 +228,7 @@ fn set(bits: &mut [u64], place: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::{Progress, Stage, Step};
+    use crate::progress::Progress;
     use crate::storage::Scratch;
     use crate::triangles::{Part, Triangle};
 
@@ -263,9 +255,8 @@ mod tests {
         let stream = TriangleStream { parts, count: count.into(), placement: None };
         let mut hashes = Sorter::of_runs(count as usize);
         (0..count).for_each(|place| hashes.extend(&[Hashed([7, 7, place])], &spill).unwrap());
-        let tally = progress.tally(Step::Bake(Stage::Prepare), 1, count.into(), count.into());
         let mut pairs = Vec::new();
-        let dropped = find(&stream, hashes, count as usize, &spill, &tally, |found| {
+        let dropped = find(&stream, hashes, count as usize, &spill, |found| {
             if let Found::Pair(pair) = found {
                 pairs.push(pair);
             }

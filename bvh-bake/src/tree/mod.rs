@@ -19,7 +19,7 @@ pub(crate) mod turning;
 
 use crate::error::BakeError;
 use crate::options::Effort;
-use crate::progress::{Stage, Step, Tally, WHOLE};
+use crate::progress::{Stage, Step};
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
 use crate::threads;
 use crate::triangles::{Batch, BatchStream, Kept, Triangle};
@@ -31,11 +31,6 @@ pub(crate) use bricks::{BrickIndex, Grid};
 use bvh_format::leaf::{PACKET, order_of_lanes};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
-
-/// The shares of two passes over the triangles in the stage's work, in parts of [`WHOLE`]: dividing them into bricks,
-/// and building the bricks' trees. The rest is the encoding.
-const DIVIDE_WEIGHT: u64 = 2;
-const TREES_WEIGHT: u64 = 9;
 
 /// Returns true if `triangles` triangles make a single brick.
 pub(crate) fn is_one_brick(triangles: u64) -> bool {
@@ -100,10 +95,8 @@ impl Bricks {
     ) -> Result<Self, BakeError> {
         let builder = Builder::new(width, effort);
         let spill = resources.scratch.spill();
-        let tally = tally(resources, DIVIDE_WEIGHT, triangles.count());
         let (bricks, boxes) = (Vec::new(), Vec::new());
-        let mut division =
-            Division { builder: &builder, resources, spill: &spill, tally: &tally, bricks, boxes };
+        let mut division = Division { builder: &builder, resources, spill: &spill, bricks, boxes };
         let top = division.divide(triangles, triangles.count(), bounds, grid)?;
         let (bricks, boxes) = (division.bricks, division.boxes);
         Ok(Self { bricks, boxes, top, builder })
@@ -122,11 +115,7 @@ impl Bricks {
         make: impl Fn(usize, Tree<PacketTriangles>, &Batch) -> Result<T, BakeError> + Sync,
     ) -> Result<(Vec<T>, Tree<BrickIndex>), BakeError> {
         let Self { bricks, top, builder, .. } = self;
-        let (count, triangles) = (bricks.len(), bricks.iter().map(BatchStream::count).sum());
-        let (trees, rest) = (
-            tally(resources, TREES_WEIGHT, triangles),
-            tally(resources, WHOLE - DIVIDE_WEIGHT - TREES_WEIGHT, triangles),
-        );
+        let count = bricks.len();
         // The largest bricks come first, so that few threads wait for the last one.
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by_key(|&number| std::cmp::Reverse(bricks[number].count()));
@@ -134,9 +123,11 @@ impl Bricks {
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
         let make = |number: usize| {
             let brick = locked(&bricks[number]).take().expect("each brick is built once");
-            let (tree, triangles) = builder.tree_of_brick(brick, &trees)?;
+            let (tree, triangles) = builder.tree_of_brick(brick)?;
+            let done = || resources.progress.add(Step::Bake(Stage::Build), triangles.len() as u64);
+            done();
             let made = make(number, tree, &triangles)?;
-            rest.add(triangles.len() as u64);
+            done();
             Ok::<T, BakeError>(made)
         };
         let next = AtomicUsize::new(0);
@@ -166,11 +157,6 @@ fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().expect("no thread panics while it holds the lock")
 }
 
-/// Starts a tally of a pass over `triangles` triangles.
-fn tally(resources: &Resources, weight: u64, triangles: u64) -> Tally<'_> {
-    resources.progress.tally(Step::Bake(Stage::Build), weight, triangles, triangles)
-}
-
 struct Builder {
     /// The number of triangles in a full treelet of leaves.
     treelet: usize,
@@ -195,7 +181,6 @@ impl Builder {
     fn tree_of_brick(
         &self,
         brick: BatchStream,
-        trees: &Tally,
     ) -> Result<(Tree<PacketTriangles>, Batch<'static>), BakeError> {
         let triangles = brick.take()?;
         let mut tree = self.tree(&triangles);
@@ -206,7 +191,6 @@ impl Builder {
             order.extend_from_slice(packet.numbers());
             *packet = PacketTriangles::new(first..order.len() as u32);
         }
-        trees.add(triangles.len() as u64);
         Ok((tree, triangles.at(order.iter().map(|&number| number as usize))))
     }
 

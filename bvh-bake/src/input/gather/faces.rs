@@ -5,20 +5,14 @@ use crate::error::{Fault, Halt};
 use crate::input::indexed::{FaceRun, IndexedFaces, LookedUp};
 use crate::input::names::Names;
 use crate::input::polygon::Cutter;
-use crate::progress::Tally;
 use crate::threads;
 
 /// The number of faces that one thread cuts at a time.
 const FACES_PER_TASK: usize = 1 << 12;
 
 impl Gatherer<'_> {
-    /// Adds faces that have been checked to the objects of `names`. `tally` counts the corners.
-    pub(super) fn add_faces(
-        &mut self,
-        faces: &IndexedFaces,
-        names: &Names,
-        tally: &Tally,
-    ) -> Result<(), Halt> {
+    /// Adds faces that have been checked to the objects of `names`.
+    pub(super) fn add_faces(&mut self, faces: &IndexedFaces, names: &Names) -> Result<(), Halt> {
         let first = self.names.len();
         for name in names.all() {
             self.object(name.clone())?;
@@ -33,7 +27,6 @@ impl Gatherer<'_> {
                 let corners_of = |number| triangles.corners(number).map(|place| positions.at(place));
                 self.add_triangles(object, triangles.count(), corners_of)?;
             }
-            tally.add(corners.len() as u64);
             Ok::<_, Halt>(())
         })
     }

@@ -23,7 +23,6 @@ use crate::error::{Fault, Halt, Place, ReadError};
 use crate::input::mesh::{Instance, renumber, tell_apart};
 use crate::limits::MAX_TRIANGLES;
 use crate::options::Rounding;
-use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
 use crate::storage::{Piece, Spill};
 use crate::threads;
@@ -35,12 +34,6 @@ use solids::SolidsForBake;
 use std::ops::Range;
 use std::sync::OnceLock;
 use std::thread;
-
-/// The shares of OBJ text, of PLY bytes and of the bytes of points in the work of reading, in parts of [`WHOLE`]. The rest
-/// is spent on their corners.
-const OBJ_TEXT: u64 = 10;
-const PLY_BYTES: u64 = 10;
-const POINT_BYTES: u64 = 12;
 
 /// Bytes of memory per object, besides its name.
 const BYTES_PER_OBJECT: u64 = 64;
@@ -168,35 +161,21 @@ impl<'a> Gatherer<'a> {
     }
 
     fn read_stream(&mut self, opener: &Opener) -> Result<(), Halt> {
-        let open = |weight| move |is_first| opener.open(if is_first { weight } else { 0 });
+        let (input, warnings) = (opener.input, opener.input.warnings());
         let mut faces = IndexedFaces::new(self.resources);
-        let (names, left) = match opener.input.format() {
+        let mut names = Names::unnamed();
+        match input.format() {
             MeshFormat::Stl => {
-                let (reader, warnings) = (opener.open(WHOLE)?, opener.input.warnings());
-                return stl::read(reader, &mut SolidsForBake { gatherer: self, object: 0 }, warnings);
+                let mut solids = SolidsForBake { gatherer: self, object: 0 };
+                return stl::read(opener.open()?, &mut solids, warnings);
             }
-            MeshFormat::Ply => {
-                ply::read(open(PLY_BYTES), &mut faces, opener.input)?;
-                (Names::unnamed(), WHOLE - PLY_BYTES)
-            }
-            MeshFormat::Obj => {
-                let warnings = opener.input.warnings();
-                let names = obj::read(open(OBJ_TEXT), &mut faces, warnings, self.resources)?;
-                (names, WHOLE - OBJ_TEXT)
-            }
-            MeshFormat::Xyz => {
-                xyz::read(open(POINT_BYTES)(true)?, &mut faces, opener.input)?;
-                (Names::unnamed(), WHOLE - POINT_BYTES)
-            }
-            MeshFormat::Pcd => {
-                pcd::read(open(POINT_BYTES)(true)?, &mut faces, opener.input, self.resources)?;
-                (Names::unnamed(), WHOLE - POINT_BYTES)
-            }
+            MeshFormat::Ply => ply::read(|| opener.open(), &mut faces, input)?,
+            MeshFormat::Obj => names = obj::read(|| opener.open(), &mut faces, warnings, self.resources)?,
+            MeshFormat::Xyz => xyz::read(opener.open()?, &mut faces, input)?,
+            MeshFormat::Pcd => pcd::read(opener.open()?, &mut faces, input, self.resources)?,
             MeshFormat::Gltf | MeshFormat::Collada => unreachable!("these are no streams"),
-        };
-        let length = opener.input.length();
-        let tally = self.resources.progress.tally(Step::Read, left, length, faces.corner_count());
-        self.add_faces(&faces, &names, &tally)
+        }
+        self.add_faces(&faces, &names)
     }
 
     /// Names the objects from the number `first` on after their file, if objects stay separate and have no name. A glTF
