@@ -34,8 +34,7 @@ mod warnings;
 pub mod xml;
 mod xyz;
 
-use crate::error::BakeError;
-use crate::error::{Fault, Halt, excerpt};
+use crate::error::{BakeError, Fault, Halt, excerpt};
 pub use crate::error::{Place, ReadError};
 use crate::options::Options;
 use crate::progress::Progress;

@@ -1,7 +1,7 @@
 //! Puts the parts of a file together, section by section from the first to the last.
 
 use crate::error::BakeError;
-use crate::pages::unnumbered::{Numbering, ObjectPages, UnnumberedPages};
+use crate::pages::unnumbered::{Numbering, ObjectPages};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
@@ -42,7 +42,7 @@ pub(crate) fn assemble(
     provenance: &str,
     output: &mut Output,
 ) -> Result<(), BakeError> {
-    let Contents { records, objects, instances, duplicates, mut topology, spill } = contents;
+    let Contents { records, objects, instances, duplicates, topology, spill } = contents;
     let sum = |bytes: fn(&ObjectPages) -> usize| objects.iter().map(bytes).sum::<usize>();
     let table = write_objects(&records);
     let lengths = [
@@ -66,42 +66,15 @@ pub(crate) fn assemble(
     file.section(SectionKind::Objects, lengths[0], |section| section.write(table))?;
     let (mut leaves, mut ids) = (Vec::new(), Vec::new());
     file.section(SectionKind::Nodes, lengths[1], |section| {
-        let mut place = PagePlace::default();
-        for ObjectPages { profile, parts, parents } in objects {
-            let numbering = Numbering { profile, parents, first: place.page };
-            place = place.of_next_object();
-            let mut pages = Vec::new();
-            for UnnumberedPages { pages: own, leaves: own_leaves, ids: own_ids } in parts {
-                pages.push(own);
-                leaves.push(own_leaves);
-                ids.push(own_ids);
-            }
-            in_batches(pages, |mut batch| {
-                numbering.number(&mut batch, &mut place);
-                batch.into_iter().try_for_each(|pages| section.write(pages))
-            })?;
-        }
-        Ok(())
+        write_nodes(section, objects, &mut leaves, &mut ids)
     })?;
-    let blocks = |section: &mut OpenSection, pieces: Vec<Piece<u8>>| {
-        in_batches(pieces, |batch| batch.into_iter().try_for_each(|blocks| section.write(blocks)))
-    };
-    file.section(SectionKind::Leaves, lengths[2], |section| blocks(section, leaves))?;
+    file.section(SectionKind::Leaves, lengths[2], |section| write_blocks(section, leaves))?;
     if with_ids {
-        file.section(SectionKind::Ids, lengths[3], |section| blocks(section, ids))?;
+        file.section(SectionKind::Ids, lengths[3], |section| write_blocks(section, ids))?;
     }
     if has_duplicates {
-        file.section(SectionKind::Duplicates, duplicates.count() as usize * 8, |section| {
-            let mut bytes = Vec::new();
-            duplicates.visit(|pair| {
-                pair.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
-                if bytes.len() >= 1 << 20 {
-                    section.write(std::mem::take(&mut bytes))?;
-                }
-                Ok(())
-            })?;
-            section.write(bytes)
-        })?;
+        let length = duplicates.count() as usize * 8;
+        file.section(SectionKind::Duplicates, length, |section| write_duplicates(section, duplicates))?;
     }
     if !provenance.is_empty() {
         let text = provenance.as_bytes();
@@ -111,21 +84,70 @@ pub(crate) fn assemble(
         file.section(SectionKind::Instances, instances.len(), |section| section.write(instances))?;
     }
     if topology_bytes > 0 {
-        topology.components.finish(&spill)?;
-        topology.nets.finish(&spill)?;
         file.section(SectionKind::Topology, topology_bytes, |section| {
-            section.write(write_topology_head(&topology.records))?;
-            for piece in topology.components.pieces() {
-                section.write(little_endian(&piece.all()?))?;
-            }
-            let nets = topology.nets.pieces();
-            nets.iter().try_for_each(|piece| section.write(little_endian(piece.all()?.as_flattened())))
+            write_topology(section, topology, &spill)
         })?;
     }
     file.align(LINE)?;
     let Sections { table, content, .. } = file;
     let header = write_header(output.length(), content.finish(), &table);
     output.replace_first(header)
+}
+
+/// Numbers the pages of all objects and writes them. Lists their leaf blocks and id blocks, which follow later in the file.
+fn write_nodes(
+    section: &mut OpenSection,
+    objects: Vec<ObjectPages>,
+    leaves: &mut Vec<Piece<u8>>,
+    ids: &mut Vec<Piece<u8>>,
+) -> Result<(), BakeError> {
+    let mut place = PagePlace::default();
+    for ObjectPages { profile, parts, parents } in objects {
+        let numbering = Numbering { profile, parents, first: place.page };
+        place = place.of_next_object();
+        let mut pages = Vec::new();
+        for part in parts {
+            pages.push(part.pages);
+            leaves.push(part.leaves);
+            ids.push(part.ids);
+        }
+        in_batches(pages, |mut batch| {
+            numbering.number(&mut batch, &mut place);
+            batch.into_iter().try_for_each(|pages| section.write(pages))
+        })?;
+    }
+    Ok(())
+}
+
+fn write_blocks(section: &mut OpenSection, pieces: Vec<Piece<u8>>) -> Result<(), BakeError> {
+    in_batches(pieces, |batch| batch.into_iter().try_for_each(|blocks| section.write(blocks)))
+}
+
+fn write_duplicates(section: &mut OpenSection, duplicates: Sorter<[u32; 2]>) -> Result<(), BakeError> {
+    let mut bytes = Vec::new();
+    duplicates.visit(|pair| {
+        pair.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
+        if bytes.len() >= 1 << 20 {
+            section.write(std::mem::take(&mut bytes))?;
+        }
+        Ok(())
+    })?;
+    section.write(bytes)
+}
+
+fn write_topology(
+    section: &mut OpenSection,
+    mut topology: TopologyLists,
+    spill: &Spill,
+) -> Result<(), BakeError> {
+    topology.components.finish(spill)?;
+    topology.nets.finish(spill)?;
+    section.write(write_topology_head(&topology.records))?;
+    for piece in topology.components.pieces() {
+        section.write(little_endian(&piece.all()?))?;
+    }
+    let nets = topology.nets.pieces();
+    nets.iter().try_for_each(|piece| section.write(little_endian(piece.all()?.as_flattened())))
 }
 
 fn little_endian(numbers: &[u32]) -> Vec<u8> {

@@ -52,13 +52,17 @@ impl PartialOrd for Hashed {
 /// hash.
 const BITS_PER_HASH: usize = 8;
 
-/// A triangle that shares its hash with another: its corners in a fixed order, then its place in the stream, its id and its [`Turn`].
-pub(crate) type Suspect = [u64; 12];
-/// The words of the corners in a [`Suspect`], and the positions of its place, its id and its turn.
-const CORNERS: std::ops::Range<usize> = 0..9;
-const PLACE: usize = 9;
-const ID: usize = 10;
-const TURN: usize = 11;
+/// A triangle that shares its hash with another. Suspects are sorted by their fields, the first one first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Suspect {
+    /// The corners in a fixed order.
+    corners: [End; 3],
+    /// The place in the stream.
+    place: u64,
+    id: u64,
+    turn: Turn,
+}
 
 /// 1 if a triangle goes around its corners against their fixed order, else 0. Where corners are equal it is 0, because
 /// the triangle goes around them in both ways.
@@ -115,9 +119,9 @@ impl Group {
         if net.abs() > MAX_NET {
             return Err(LimitError::EqualTriangles.into());
         }
-        let [a, b, c] = [0, 3, 6].map(|at| [kept[at], kept[at + 1], kept[at + 2]]);
-        let corners = if kept[TURN] == 0 { [a, b, c] } else { [a, c, b] };
-        found(Found::Net { id: kept[ID] as u32, net: net as i32, corners })
+        let [a, b, c] = kept.corners;
+        let corners = if kept.turn == 0 { [a, b, c] } else { [a, c, b] };
+        found(Found::Net { id: kept.id as u32, net: net as i32, corners })
     }
 }
 
@@ -183,11 +187,11 @@ pub(crate) fn find(
     // Of equal triangles, the one with the first place is kept.
     let mut last: Option<Group> = None;
     suspects.visit(|suspect| match &mut last {
-        Some(Group { kept, net }) if kept[CORNERS] == suspect[CORNERS] => {
+        Some(Group { kept, net }) if kept.corners == suspect.corners => {
             any = true;
-            set(&mut dropped, suspect[PLACE] as u32);
-            *net += if kept[TURN] == suspect[TURN] { 1 } else { -1 };
-            found(Found::Pair([kept[ID] as u32, suspect[ID] as u32]))
+            set(&mut dropped, suspect.place as u32);
+            *net += if kept.turn == suspect.turn { 1 } else { -1 };
+            found(Found::Pair([kept.id as u32, suspect.id as u32]))
         }
         _ => {
             let next = Group { kept: *suspect, net: 1 };
@@ -210,13 +214,8 @@ fn of_part(stream: &TriangleStream, part: usize, shared: &[u64]) -> Result<Vec<S
         if words[place / 64] >> (place % 64) & 1 == 0 {
             return None;
         }
-        let mut suspect = [0; 12];
         let (corners, turn) = canonical(ends(triangle, triangles.exact.get(place)));
-        suspect[CORNERS].copy_from_slice(corners.as_flattened());
-        suspect[TURN] = turn;
-        suspect[PLACE] = (first + place) as u64;
-        suspect[ID] = triangle.id.into();
-        Some(suspect)
+        Some(Suspect { corners, place: (first + place) as u64, id: triangle.id.into(), turn })
     };
     Ok(triangles.iter().enumerate().filter_map(suspect).collect())
 }
