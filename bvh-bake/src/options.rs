@@ -73,9 +73,10 @@ impl Rounding {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
-    /// The treelet profile; `None` chooses the profile with the lowest estimated query cost for each object.
+    /// The treelet profile; `None` chooses the fastest one, or a smaller one if [`Self::triangles`] asks for packed or quantised
+    /// triangles.
     pub profile: Option<Profile>,
-    /// The triangle encoding; `None` chooses `F32` or `Packed`, whichever the cost model prefers.
+    /// The triangle encoding; `None` chooses `F32`, or `Packed` for objects whose plain triangles would be slow to read.
     pub triangles: Option<TriangleEncoding>,
     /// With `Quantized`, the largest distance by which a vertex may move, in mesh units. The default is 1e-5 of the
     /// diagonal of the object's box, and the limit is a hundredth of the diagonal.
@@ -104,9 +105,6 @@ pub struct Options {
     pub drop_nan: bool,
     /// Whether the original triangle numbers are kept.
     pub ids: bool,
-    /// Whether children get turning slabs, if the profile has room for them. Answers and the size of files are the
-    /// same.
-    pub turning_slabs: bool,
     /// The radius of all objects, from 0 to 2^118 mesh units: each stands for all points this near to its triangles.
     pub radius: f64,
     /// Whether what is inside the objects touches them. All of them must be closed.
@@ -129,7 +127,6 @@ impl Default for Options {
             scene: false,
             drop_nan: false,
             ids: true,
-            turning_slabs: true,
             radius: 0.0,
             solid: false,
             topology: true,
@@ -198,12 +195,6 @@ impl Options {
         Self { ids, ..self }
     }
 
-    /// Sets whether children get turning slabs, where the profile has room for them.
-    #[must_use]
-    pub fn turning_slabs(self, turning_slabs: bool) -> Self {
-        Self { turning_slabs, ..self }
-    }
-
     /// Sets the radius of all objects, in mesh units.
     #[must_use]
     pub fn radius(self, radius: f64) -> Self {
@@ -225,14 +216,13 @@ impl Options {
     /// Returns the options as one line of text. Equal options give equal text.
     pub fn stamp(&self) -> String {
         format!(
-            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}{}{}",
+            "profile={} triangles={} max_error={} effort={} split={} ids={}{}{}{}{}{}{}{}",
             self.profile.map_or("auto", Profile::name),
             self.triangles.map_or("auto", TriangleEncoding::name),
             self.max_error.map_or("default".to_owned(), |e| format!("{e:?}")),
             self.effort.name(),
             self.split_objects,
             self.ids,
-            if self.turning_slabs { "" } else { " turning_slabs=false" },
             if self.weld == 0.0 { String::new() } else { format!(" weld={:?}", self.weld) },
             if self.scene { " scene=true" } else { "" },
             if self.drop_nan { " drop_nan=true" } else { "" },

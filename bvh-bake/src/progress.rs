@@ -1,9 +1,9 @@
 //! The progress of a bake, and its bytes read and written: counters that the stages update and any thread may read.
 //!
-//! A stage goes through its triangles in several passes, each of which takes about the same share of the stage's time.
-//! Progress is counted in such passes, one part or batch of pages at a time, in relaxed atomic sums. The bake does not
-//! depend on them. While the bake runs, counters that are read together may be from slightly different moments. When it
-//! has ended, they are exact.
+//! Each step counts in a unit of its own what it has done, where a part of it is done: bytes where inputs are read and where the
+//! output is written, triangles where a part or a brick is ready, pages where they are proved. Counters are relaxed atomic
+//! sums, and the bake does not depend on them. While the bake runs, counters that are read together may be from slightly
+//! different moments. When it has ended, they are exact.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -111,8 +111,9 @@ pub struct Progress(Arc<Counters>);
 #[derive(Debug, Default)]
 struct Counters {
     work: [Work; Step::ALL.len()],
-    /// Triangles found in the inputs.
+    /// Triangles found in the inputs, and duplicates among them, which take part in no step after [`Stage::Prepare`].
     found: AtomicU64,
+    left_out: AtomicU64,
     input_read: AtomicU64,
     scratch_written: AtomicU64,
     scratch_read: AtomicU64,
@@ -122,32 +123,42 @@ struct Counters {
     output_read: AtomicU64,
 }
 
-/// The work of a step and the part of it that is done: bytes while reading and triangles later, times [`WHOLE`].
+/// The work of a step and the part of it that is done, in the unit of the step. The total is 0 until it is known.
 #[derive(Debug, Default)]
 struct Work {
     done: AtomicU64,
     total: AtomicU64,
 }
 
-/// The sum of the weights of all passes of a step over one triangle or byte: a weight counts sixteenths of the step.
-pub(crate) const WHOLE: u64 = 16;
+/// Both [`Stage::Prepare`] and [`Stage::Build`] count each triangle twice, after two passes over it.
+const PASSES: u64 = 2;
 
 impl Progress {
     /// Returns the share of a step that is done, from 0 to 1, or `None` while it is unknown.
     pub fn share(&self, step: Step) -> Option<f64> {
-        let Work { done, total } = &self.0.work[step.index()];
-        let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
-        (total > 0).then(|| done.min(total) as f64 / total as f64)
+        let (done, total) = self.work(step);
+        (total > 0).then(|| done as f64 / total as f64)
     }
 
     /// Returns the number of triangles that a step has done. While reading, these are the triangles found so far.
-    /// Later, they are the triangles that all passes have completed, or as many as the passes so far are worth. When a
-    /// step has ended, the number is that of the input up to [`Stage::Prepare`], and then that of the stored triangles.
+    /// Later, they are as many as the work so far is worth. When a step has ended, the number is that of the input up to
+    /// [`Stage::Prepare`], and then that of the stored triangles.
     pub fn triangles(&self, step: Step) -> u64 {
-        match step {
-            Step::Read => self.0.found.load(Ordering::Relaxed),
-            step => self.0.work[step.index()].done.load(Ordering::Relaxed) / WHOLE,
+        let found = self.0.found.load(Ordering::Relaxed);
+        if step == Step::Read {
+            return found;
         }
+        let is_input = step == Step::Bake(Stage::Prepare);
+        let left_out = if is_input { 0 } else { self.0.left_out.load(Ordering::Relaxed) };
+        let (done, total) = self.work(step);
+        (u128::from(done) * u128::from(found.saturating_sub(left_out)) / u128::from(total.max(1))) as u64
+    }
+
+    /// Returns what a step has done, and all that it has to do.
+    fn work(&self, step: Step) -> (u64, u64) {
+        let Work { done, total } = &self.0.work[step.index()];
+        let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
+        (done.min(total), total)
     }
 
     /// Returns the bytes read and written so far.
@@ -164,40 +175,42 @@ impl Progress {
         }
     }
 
-    /// Records the total bytes of the inputs, which are read or parsed.
-    pub(crate) fn expect_bytes(&self, bytes: u64) {
-        self.0.work[Step::Read.index()].total.store(bytes.saturating_mul(WHOLE), Ordering::Relaxed);
-    }
-
     /// Adds triangles that were found.
     pub(crate) fn find(&self, triangles: u64) {
         self.0.found.fetch_add(triangles, Ordering::Relaxed);
     }
 
-    /// Records that all inputs have been read, and the number of triangles that go through all later steps.
-    pub(crate) fn expect(&self, triangles: u64) {
-        let [read, others @ ..] = &self.0.work;
-        read.done.store(read.total.load(Ordering::Relaxed), Ordering::Relaxed);
-        others.iter().for_each(|work| work.total.store(triangles * WHOLE, Ordering::Relaxed));
+    /// Records that all inputs have been read.
+    pub(crate) fn end_reading(&self) {
+        self.end(Step::Read);
+        let passes = PASSES * self.0.found.load(Ordering::Relaxed);
+        self.expect(Step::Bake(Stage::Prepare), passes);
+        self.expect(Step::Bake(Stage::Build), passes);
     }
 
-    /// Records the number of duplicates, which take part in no step after [`Stage::Prepare`].
+    /// Records duplicates, of which the second pass of [`Stage::Prepare`] and all later steps know nothing.
     pub(crate) fn leave_out(&self, triangles: u64) {
-        for work in &self.0.work[Step::Bake(Stage::Build).index()..] {
-            work.total.fetch_sub(triangles * WHOLE, Ordering::Relaxed);
-        }
+        self.0.left_out.fetch_add(triangles, Ordering::Relaxed);
+        self.add(Step::Bake(Stage::Prepare), triangles);
+        let build = &self.0.work[Step::Bake(Stage::Build).index()];
+        build.total.fetch_sub(PASSES * triangles, Ordering::Relaxed);
     }
 
-    /// Records that a step has completed the first `triangles` triangles.
-    pub(crate) fn reach(&self, step: Step, triangles: u64) {
-        self.0.work[step.index()].done.store(triangles * WHOLE, Ordering::Relaxed);
+    /// Records how much work a step has, in its unit.
+    pub(crate) fn expect(&self, step: Step, total: u64) {
+        self.0.work[step.index()].total.store(total, Ordering::Relaxed);
     }
 
-    /// Starts to count a pass over `amount` triangles or bytes of inputs. The pass is complete when `units` units have
-    /// been added; `weight` is its share of [`WHOLE`].
-    pub(crate) fn tally(&self, step: Step, weight: u64, amount: u64, units: u64) -> Tally<'_> {
-        let work = &self.0.work[step.index()].done;
-        Tally { work, worth: amount.saturating_mul(weight), units, done: AtomicU64::new(0) }
+    /// Adds work that a step has done.
+    pub(crate) fn add(&self, step: Step, done: u64) {
+        self.0.work[step.index()].done.fetch_add(done, Ordering::Relaxed);
+    }
+
+    /// Records that a step has ended.
+    pub(crate) fn end(&self, step: Step) {
+        let Work { done, total } = &self.0.work[step.index()];
+        total.fetch_max(1, Ordering::Relaxed);
+        done.store(total.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 
     pub(crate) fn add_input_read(&self, bytes: u64) {
@@ -235,55 +248,43 @@ impl Progress {
     }
 }
 
-/// A part of a step's work, which is done unit by unit.
-pub(crate) struct Tally<'a> {
-    work: &'a AtomicU64,
-    /// The work of all units.
-    worth: u64,
-    units: u64,
-    done: AtomicU64,
-}
-
-impl Tally<'_> {
-    /// Adds units that are done. Units beyond the stated number are ignored.
-    pub(crate) fn add(&self, units: u64) {
-        let before = self.done.fetch_add(units, Ordering::Relaxed);
-        let worth = self.worth_of(before + units) - self.worth_of(before);
-        self.work.fetch_add(worth, Ordering::Relaxed);
-    }
-
-    /// Returns the work of `units` units, computed such that rounding errors do not accumulate.
-    fn worth_of(&self, units: u64) -> u64 {
-        let part = u128::from(self.worth) * u128::from(units.min(self.units)) / u128::from(self.units.max(1));
-        part as u64
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
-    fn passes_add_up_to_the_whole() {
+    fn work_adds_up_to_the_whole() {
         let progress = Progress::default();
-        let step = Step::Bake(Stage::Build);
-        assert_eq!(progress.share(step), None);
-        progress.expect(1000);
-        for (weight, units) in [(5, 7), (WHOLE - 5, 100_001)] {
-            let tally = progress.tally(step, weight, 1000, units);
-            let before = progress.share(step).unwrap();
+        let (prepare, build, prove) =
+            (Step::Bake(Stage::Prepare), Step::Bake(Stage::Build), Step::Bake(Stage::Prove));
+        assert!(Step::ALL.iter().all(|&step| progress.share(step).is_none()));
+        progress.find(1000);
+        progress.end_reading();
+        let triangles = |step, done| {
             std::thread::scope(|scope| {
-                (0..4).for_each(|_| drop(scope.spawn(|| (0..units).for_each(|_| tally.add(1)))));
+                (0..4).for_each(|_| drop(scope.spawn(|| (0..done / 4).for_each(|_| progress.add(step, 1)))));
             });
-            let passed = progress.share(step).unwrap() - before;
-            assert!((passed - weight as f64 / WHOLE as f64).abs() < 1e-12, "{passed}");
-        }
-        assert_eq!((progress.share(step), progress.triangles(step)), (Some(1.0), 1000));
+        };
+        assert_eq!((progress.share(Step::Read), progress.triangles(Step::Read)), (Some(1.0), 1000));
+        assert_eq!((progress.share(prepare), progress.triangles(prepare)), (Some(0.0), 0));
+        triangles(prepare, 1000);
+        assert_eq!((progress.share(prepare), progress.triangles(prepare)), (Some(0.5), 500));
         progress.leave_out(200);
-        progress.reach(step, 800);
-        assert_eq!((progress.share(step), progress.triangles(step)), (Some(1.0), 800));
-        assert_eq!(progress.share(Step::Bake(Stage::Prepare)), Some(0.0));
+        triangles(prepare, 800);
+        assert_eq!((progress.share(prepare), progress.triangles(prepare)), (Some(1.0), 1000));
+        assert_eq!(progress.share(build), Some(0.0));
+        triangles(build, 1600);
+        assert_eq!((progress.share(build), progress.triangles(build)), (Some(1.0), 800));
+        // The unit of the proof is a page. More than all is all.
+        progress.expect(prove, 3);
+        progress.add(prove, 1);
+        assert_eq!((progress.share(prove), progress.triangles(prove)), (Some(1.0 / 3.0), 266));
+        progress.add(prove, 3);
+        assert_eq!((progress.share(prove), progress.triangles(prove)), (Some(1.0), 800));
+        assert_eq!(progress.share(Step::Write), None);
+        progress.end(Step::Write);
+        assert_eq!((progress.share(Step::Write), progress.triangles(Step::Write)), (Some(1.0), 800));
     }
 
     #[test]

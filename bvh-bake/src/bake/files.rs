@@ -144,7 +144,9 @@ impl<'a> FileBake<'a> {
             return Err(InputError::Empty.into());
         }
         refuse_output(&self.inputs, &self.output)?;
-        self.progress.expect_bytes(file_lengths(&self.inputs));
+        let may_be_up_to_date = !self.force && self.output.exists();
+        let readings = if may_be_up_to_date { 2 } else { 1 };
+        self.progress.expect(Step::Read, file_lengths(&self.inputs).saturating_mul(readings));
         storage::remove_stale(self.scratch_directory());
         bake::check_numbers(&self.options)?;
         // If the budget is too small for any mesh, the inputs are not even read.
@@ -155,7 +157,7 @@ impl<'a> FileBake<'a> {
         // Reading the inputs gives their checksums. They are needed before that only if an existing output may be up to
         // date.
         let taken = inputs.iter().map(InputFile::bytes_in_memory).sum();
-        if !self.force && self.output.exists() {
+        if may_be_up_to_date {
             let memory = self.memory_of_inputs(taken);
             let checksums = inputs.iter().map(|input| {
                 Checksums::of(input, memory, &self.progress).map_err(|halt| halt.in_file(input.path()))
@@ -193,7 +195,7 @@ impl<'a> FileBake<'a> {
         let mut report = bake::bake(gatherer, &self.options, &provenance, &mut output, &mut on_stage)?;
         on_step(Step::Write);
         output.rename()?;
-        self.progress.reach(Step::Write, report.file.triangles);
+        self.progress.end(Step::Write);
         report.seconds = start.elapsed().as_secs_f64();
         Ok(Outcome::Baked(Box::new(report)))
     }

@@ -85,12 +85,12 @@ fn bake(
     begin: &mut dyn FnMut(Stage),
 ) -> Result<BakeReport, BakeError> {
     let resources = gatherer.resources();
-    let (triangles, id_end) = (gatherer.triangles(), gatherer.id_end());
+    let id_end = gatherer.id_end();
     let (instances, warnings) = (gatherer.take_instances(), gatherer.take_warnings());
     check_numbers(options)?;
     let provenance = &stating_moves(provenance, options);
     let gathered = gatherer.finish(options.weld, |name, diagonal| grid_error(options, name, diagonal))?;
-    resources.progress.expect(triangles);
+    resources.progress.end_reading();
     let mut baker = Baker::new(options, instances, id_end, resources);
     let mut gathered = gathered.into_iter().peekable();
     while gathered.peek().is_some() {
@@ -145,12 +145,8 @@ struct Baker<'a> {
     reason: Option<String>,
     /// The smallest advised error of the objects whose allowed error is coarse.
     advised_max_error: Option<f64>,
-    vertices: u64,
     children: u64,
     treelets: u64,
-    /// The number of triangles of the objects so far, and the number of those that are stored.
-    triangles: u64,
-    kept: u64,
 }
 
 impl<'a> Baker<'a> {
@@ -173,11 +169,8 @@ impl<'a> Baker<'a> {
             pages: 0,
             reason: None,
             advised_max_error: None,
-            vertices: 0,
             children: 0,
             treelets: 0,
-            triangles: 0,
-            kept: 0,
         }
     }
 
@@ -193,20 +186,16 @@ impl<'a> Baker<'a> {
             }
             self.advised_max_error =
                 self.advised_max_error.into_iter().chain(object.advised_error).reduce(f64::min);
-            self.triangles += object.triangles();
             progress.leave_out(object.left_out);
         }
-        progress.reach(Step::Bake(Stage::Prepare), self.triangles);
         begin(Stage::Build);
         let built = threads::map(prepared, |object| Built::new(object, shared));
-        built.into_iter().try_for_each(|object| self.push(object?))?;
-        self.shared.resources.progress.reach(Step::Bake(Stage::Build), self.kept);
-        Ok(())
+        built.into_iter().try_for_each(|object| self.push(object?))
     }
 
     /// Adds an object after all others.
     fn push(&mut self, object: Built) -> Result<(), BakeError> {
-        let Built { name, mut record, encoded, reason, vertices } = object;
+        let Built { name, mut record, encoded, reason } = object;
         let EncodedObject { pages, packets, treelets, children, topology } = encoded;
         let page_count = pages.page_count();
         if (self.pages + page_count) as u64 > MAX_PAGES {
@@ -223,8 +212,6 @@ impl<'a> Baker<'a> {
         }
         self.reason.get_or_insert(reason);
         self.pages += page_count;
-        self.kept += record.triangles.get();
-        self.vertices += vertices;
         self.children += children;
         self.treelets += treelets;
         self.objects.push(pages);
@@ -252,8 +239,8 @@ impl<'a> Baker<'a> {
         begin(Stage::Encode);
         let instance_count = instances.len() as u64;
         let contents = Contents { records, objects, instances, duplicates, topology, spill };
-        assemble(contents, options.ids, provenance, target, progress)?;
-        progress.reach(Step::Bake(Stage::Encode), self.kept);
+        assemble(contents, options.ids, provenance, target)?;
+        progress.end(Step::Bake(Stage::Encode));
         // Open edges are counted in the finished bytes, with the memory that bricks no longer take.
         let counting = (resources.scratch.spill(), resources.brick_bytes as u64);
         if let Some((number, object)) = open_solid {
@@ -271,14 +258,13 @@ impl<'a> Baker<'a> {
             true => Some(count_all::<_, BakeError>(&layout, &target.source(), &counting.0, counting.1)?),
             false => layout.has_topology().then(OpenEdges::default),
         };
-        progress.reach(Step::Bake(Stage::Prove), self.kept);
+        progress.end(Step::Bake(Stage::Prove));
         Ok(BakeReport {
             file: FileSummary::new(&layout, target.length(), instance_count, &topology),
             open_edges,
             reason: self.reason.unwrap_or_default(),
             advised_max_error: self.advised_max_error,
             warnings: Vec::new(),
-            vertices: self.vertices,
             width_inflation: inflation.mean_width(),
             volume_inflation: inflation.mean_volume(),
             mean_children: self.children as f64 / self.treelets as f64,

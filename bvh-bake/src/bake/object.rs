@@ -7,7 +7,7 @@ use crate::options::{Effort, Options};
 use crate::pages::Style;
 use crate::pages::brick::{EncodedObject, encode_object};
 use crate::prepare::duplicates::Found;
-use crate::prepare::layout_choice::{self, Choice};
+use crate::prepare::layout_choice::{Choice, choose};
 use crate::prepare::quantization::advised_error;
 use crate::prepare::{Measured, Surveyed, measure, survey};
 use crate::storage::Spill;
@@ -86,11 +86,6 @@ impl Prepared {
         let left_out = duplicates.count();
         Ok(Self { gathered, measured, surveyed, nets, duplicates: Some(duplicates), left_out, advised_error })
     }
-
-    /// Returns the number of triangles, duplicates included.
-    pub(super) fn triangles(&self) -> u64 {
-        self.gathered.stream.count
-    }
 }
 
 /// An object whose pages are made.
@@ -101,28 +96,25 @@ pub(super) struct Built {
     pub(super) encoded: EncodedObject,
     /// The reason for the layout.
     pub(super) reason: String,
-    pub(super) vertices: u64,
 }
 
 impl Built {
     pub(super) fn new(prepared: Prepared, shared: &Shared) -> Result<Self, BakeError> {
         let Shared { options, resources, id_count, .. } = *shared;
         let Prepared { gathered, measured, mut surveyed, nets, left_out, .. } = prepared;
-        let Gathered { name, behind, stream, moved, welded, vertices, is_cloud } = gathered;
+        let Gathered { name, behind, stream, moved, welded, is_cloud } = gathered;
         let moved = moved.joined(measured.moved).rounded_up();
         let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
-        let (grid, width) = (surveyed.grid.take(), layout_choice::width(options));
+        let triangles = kept.count();
+        let Choice { profile, encoding, reason } = choose(triangles, is_cloud, options);
+        let grid = surveyed.grid.take();
         // Points have no extent, so that finer splits make no better tree of them.
         let effort = if is_cloud { Effort::Fast } else { options.effort };
-        let mut bricks = Bricks::divide(&kept, &measured.bounds, grid, width, effort, resources)?;
-        let triangles = kept.count();
+        let bricks = Bricks::divide(&kept, &measured.bounds, grid, profile.width(), effort, resources)?;
         drop(stream);
         let origin = behind.are_corrected().then_some(behind.origin);
         let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles, origin));
-        let (tree, of_brick) = bricks.first_tree(resources)?;
-        let Choice { profile, encoding, reason } =
-            layout_choice::choose(triangles, tree, of_brick, is_cloud, options);
         let style = Style {
             profile,
             encoding,
@@ -130,7 +122,6 @@ impl Built {
             ids: options.ids,
             is_cloud,
             behind,
-            turning_slabs: options.turning_slabs && profile.has_turning_slabs() && !is_cloud,
         };
         let encoded = encode_object(bricks, style, survey, resources, &shared.spill)?;
         let bounds = bounds_of_vertices(&measured.bounds, &behind);
@@ -161,7 +152,7 @@ impl Built {
             scale: behind.scale.into(),
             ..ObjectRecord::new_zeroed()
         };
-        Ok(Self { name, record, encoded, reason, vertices })
+        Ok(Self { name, record, encoded, reason })
     }
 }
 

@@ -24,8 +24,6 @@ pub struct BakeReport {
     /// What the readers did that the authors of the inputs may not expect, such as bytes or points that they left out. Each is one
     /// line that names the file and the place. None of them are known if the output was up to date.
     pub warnings: Vec<String>,
-    /// The number of distinct vertices that the input's triangles use.
-    pub vertices: u64,
     /// The mean of decoded width over tight width, over all nodes and slabs.
     pub width_inflation: f64,
     /// The mean of decoded box volume over tight box volume, over all nodes.

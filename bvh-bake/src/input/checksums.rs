@@ -20,22 +20,21 @@ impl Checksums {
     /// Reads an input only for its checksums.
     pub(crate) fn of(input: &InputFile, memory: Allowance, progress: &Progress) -> Result<Self, Halt> {
         if input.format() == MeshFormat::Gltf {
-            return Self::of_gltf(input, &mut (), memory, progress, 0);
+            return Self::of_gltf(input, &mut (), memory, progress);
         }
-        Ok(Self { file: input.checksum(progress, 0)?, mesh: None })
+        Ok(Self { file: input.checksum(progress)?, mesh: None })
     }
 
-    /// Reads a glTF file into `sink`, which is a pass of the given weight.
+    /// Reads a glTF file into `sink`.
     pub(crate) fn of_gltf(
         input: &InputFile,
         sink: &mut dyn Sink,
         memory: Allowance,
         progress: &Progress,
-        weight: u64,
     ) -> Result<Self, Halt> {
         input.look(progress)?;
         let mesh = gltf::read(input, &input.random_access()?, sink, memory, progress)?;
         // The document is not in memory any more.
-        Ok(Self { file: input.checksum(progress, weight)?, mesh: Some(mesh) })
+        Ok(Self { file: input.checksum(progress)?, mesh: Some(mesh) })
     }
 }

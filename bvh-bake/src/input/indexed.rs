@@ -76,10 +76,6 @@ impl IndexedFaces {
         self.vertices
     }
 
-    pub(crate) fn corner_count(&self) -> u64 {
-        self.corners.count()
-    }
-
     pub(crate) fn add_vertices(&mut self, mut positions: &[[f64; 3]]) -> Result<(), BakeError> {
         self.vertices += positions.len() as u64;
         self.has_misfits |= !positions.as_flattened().iter().all(|&value| coordinate_fits(value));

@@ -9,7 +9,7 @@ use super::warnings::Warnings;
 use super::{MeshFormat, UpAxis};
 use crate::error::{Halt, ReadError};
 use crate::options::Options;
-use crate::progress::{Progress, Step, Tally};
+use crate::progress::{Progress, Step};
 use crate::storage::read_exact_at;
 use crate::storage::resources::Allowance;
 use bvh_format::checksum::Hasher;
@@ -101,7 +101,7 @@ impl<'a> InputFile<'a> {
     /// content suggests. A pipe or another file without a length is read as a whole, which `memory` must allow.
     pub(crate) fn find(path: &'a Path, memory: Allowance, progress: &Progress) -> Result<Self, Halt> {
         let failed = |source| ReadError::Io { path: path.to_owned(), source };
-        let mut reader = InputReader::open(path, progress, 0).map_err(failed)?;
+        let mut reader = InputReader::open(path, progress).map_err(failed)?;
         let is_regular = reader.is_regular().map_err(failed)?;
         let bytes = match is_regular {
             true => None,
@@ -144,24 +144,23 @@ impl<'a> InputFile<'a> {
         if matches!(self.bytes, Some(Cow::Owned(_))) { self.length } else { 0 }
     }
 
-    /// Starts to read the bytes. Reading them is a pass of the given weight.
-    fn reader<'r>(&'r self, progress: &'r Progress, weight: u64) -> io::Result<InputReader<'r>> {
+    /// Starts to read the bytes.
+    fn reader<'r>(&'r self, progress: &'r Progress) -> io::Result<InputReader<'r>> {
         match &self.bytes {
-            None => InputReader::open(&self.path, progress, weight),
+            None => InputReader::open(&self.path, progress),
             Some(bytes) => {
-                let tally = progress.tally(Step::Read, weight, self.length, self.length);
                 let source = Source::Memory(bytes);
-                Ok(InputReader { source, length: self.length, progress, tally, checksum: None })
+                Ok(InputReader { source, length: self.length, progress, checksum: None })
             }
         }
     }
 
-    /// Returns all bytes. Reading them is a pass of the given weight.
-    pub(crate) fn read_all(&self, progress: &Progress, weight: u64) -> Result<Cow<'_, [u8]>, ReadError> {
+    /// Returns all bytes.
+    pub(crate) fn read_all(&self, progress: &Progress) -> Result<Cow<'_, [u8]>, ReadError> {
         if let Some(bytes) = &self.bytes {
             return Ok(Cow::Borrowed(bytes));
         }
-        let bytes = self.reader(progress, weight).and_then(|mut reader| reader.read_up_to(u64::MAX));
+        let bytes = self.reader(progress).and_then(|mut reader| reader.read_up_to(u64::MAX));
         bytes.map(Cow::Owned).map_err(|source| self.failed(source))
     }
 
@@ -192,11 +191,11 @@ impl<'a> InputFile<'a> {
         }
     }
 
-    /// Returns the checksum of all bytes. Reading them is a pass of the given weight.
-    pub(crate) fn checksum(&self, progress: &Progress, weight: u64) -> Result<u64, ReadError> {
+    /// Returns the checksum of all bytes.
+    pub(crate) fn checksum(&self, progress: &Progress) -> Result<u64, ReadError> {
         let mut hasher = Hasher::default();
         let mut block = vec![0; CHECKSUM_BYTES];
-        let mut reader = self.reader(progress, weight).map_err(|source| self.failed(source))?;
+        let mut reader = self.reader(progress).map_err(|source| self.failed(source))?;
         loop {
             match reader.read(&mut block) {
                 Ok(0) => return Ok(hasher.finish()),
@@ -256,9 +255,9 @@ pub(crate) struct Opener<'scope, 'env> {
 }
 
 impl<'scope, 'env> Opener<'scope, 'env> {
-    /// Opens the input. Reading it is a pass of the given weight.
-    pub(crate) fn open(&self, weight: u64) -> Result<ByteReader<impl Read + use<'scope, 'env>>, Halt> {
-        let mut reader = self.input.reader(self.progress, weight).map_err(Halt::Io)?;
+    /// Opens the input.
+    pub(crate) fn open(&self) -> Result<ByteReader<impl Read + use<'scope, 'env>>, Halt> {
+        let mut reader = self.input.reader(self.progress).map_err(Halt::Io)?;
         reader.checksum = Some((Hasher::default(), self.checksum));
         let length = reader.length;
         #[cfg(not(target_family = "wasm"))]
@@ -276,7 +275,6 @@ pub(crate) struct InputReader<'a> {
     source: Source<'a>,
     length: u64,
     progress: &'a Progress,
-    tally: Tally<'a>,
     /// The hasher, and where the checksum goes when all bytes have been read in order; `None` if nobody needs it.
     checksum: Option<(Hasher, &'a OnceLock<u64>)>,
 }
@@ -288,12 +286,11 @@ enum Source<'a> {
 }
 
 impl<'a> InputReader<'a> {
-    /// Opens a file. Reading it is a pass of the given weight.
-    pub(crate) fn open(path: &Path, progress: &'a Progress, weight: u64) -> io::Result<Self> {
+    /// Opens a file.
+    pub(crate) fn open(path: &Path, progress: &'a Progress) -> io::Result<Self> {
         let file = File::open(path)?;
         let length = file.metadata()?.len();
-        let tally = progress.tally(Step::Read, weight, length, length);
-        Ok(Self { source: Source::File(file), length, progress, tally, checksum: None })
+        Ok(Self { source: Source::File(file), length, progress, checksum: None })
     }
 
     /// Returns whether this is a regular file, which has an end.
@@ -328,7 +325,7 @@ impl Read for InputReader<'_> {
             }
             Source::Memory(rest) => rest.read(buffer)?,
         };
-        self.tally.add(count as u64);
+        self.progress.add(Step::Read, count as u64);
         if let Some((hasher, checksum)) = &mut self.checksum {
             if count > 0 {
                 hasher.update(&buffer[..count]);

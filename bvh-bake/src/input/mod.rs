@@ -34,11 +34,10 @@ mod warnings;
 pub mod xml;
 mod xyz;
 
-use crate::error::BakeError;
-use crate::error::{Fault, Halt, excerpt};
+use crate::error::{BakeError, Fault, Halt, excerpt};
 pub use crate::error::{Place, ReadError};
 use crate::options::Options;
-use crate::progress::{Progress, WHOLE};
+use crate::progress::Progress;
 use crate::storage::resources::{Allowance, Resources};
 pub(crate) use checksums::Checksums;
 pub use collada::UpAxis;
@@ -234,7 +233,7 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
     let mesh = if input.format() == MeshFormat::Collada {
         let resources = Resources::unlimited(progress);
         let mut found = SceneFaces::new(&resources);
-        let read = collada::read(input, &mut found, Allowance::UNLIMITED, progress, WHOLE);
+        let read = collada::read(input, &mut found, Allowance::UNLIMITED, progress);
         read.and_then(|_| found.finish(input)).and_then(|()| found.into_mesh())
     } else if input.format() == MeshFormat::Gltf {
         let mut found = gltf::InMemory::default();
@@ -245,22 +244,22 @@ fn collect(input: &InputFile) -> Result<Mesh, ReadError> {
     } else {
         thread::scope(|scope| {
             let opener = Opener { input, progress, checksum: &checksum, scope };
-            let open = |_| opener.open(WHOLE);
+            let open = || opener.open();
             // Nothing goes to scratch files.
             let resources = Resources::unlimited(progress);
             let mut faces = IndexedFaces::new(&resources);
             match input.format() {
-                MeshFormat::Stl => stl::read_mesh(open(true)?, input.warnings()),
+                MeshFormat::Stl => stl::read_mesh(open()?, input.warnings()),
                 MeshFormat::Ply => {
                     ply::read(open, &mut faces, input)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 MeshFormat::Xyz => {
-                    xyz::read(open(true)?, &mut faces, input)?;
+                    xyz::read(open()?, &mut faces, input)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 MeshFormat::Pcd => {
-                    pcd::read(open(true)?, &mut faces, input, &resources)?;
+                    pcd::read(open()?, &mut faces, input, &resources)?;
                     mesh_of_faces(&faces, &Names::unnamed())
                 }
                 _ => {

@@ -56,13 +56,13 @@ impl Sink<'_> {
 }
 
 /// Reads a file into `faces`. After a success, all their corners are vertices that the format can hold. `open` opens
-/// the file at its beginning; its argument states whether this is the first time.
+/// the file at its beginning.
 pub(crate) fn read<R: Read>(
-    open: impl Fn(bool) -> Result<ByteReader<R>, Halt>,
+    open: impl Fn() -> Result<ByteReader<R>, Halt>,
     faces: &mut IndexedFaces,
     input: &InputFile,
 ) -> Result<(), Halt> {
-    stream(open(true)?, Sink::Faces(faces), input)?;
+    stream(open()?, Sink::Faces(faces), input)?;
     faces.finish()?;
     if let Some((_, corner)) = faces.first_out_of_range()? {
         let expected = format!("vertex numbers below {}", faces.vertex_count());
@@ -72,7 +72,7 @@ pub(crate) fn read<R: Read>(
         None => Ok(()),
         Some((_, vertex)) => {
             // The second reading meets the misfit again and reports its place.
-            stream(open(false)?, Sink::MisfitOf(vertex.into()), input)?;
+            stream(open()?, Sink::MisfitOf(vertex.into()), input)?;
             Err(changed_meanwhile().into())
         }
     }

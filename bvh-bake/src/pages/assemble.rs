@@ -1,8 +1,7 @@
 //! Puts the parts of a file together, section by section from the first to the last.
 
 use crate::error::BakeError;
-use crate::pages::unnumbered::{Numbering, ObjectPages, UnnumberedPages};
-use crate::progress::{Progress, Stage, Step, Tally, WHOLE};
+use crate::pages::unnumbered::{Numbering, ObjectPages};
 use crate::storage::external_sort::Sorter;
 use crate::storage::output::Output;
 use crate::storage::{Piece, Spill};
@@ -42,9 +41,8 @@ pub(crate) fn assemble(
     with_ids: bool,
     provenance: &str,
     output: &mut Output,
-    progress: &Progress,
 ) -> Result<(), BakeError> {
-    let Contents { records, objects, instances, duplicates, mut topology, spill } = contents;
+    let Contents { records, objects, instances, duplicates, topology, spill } = contents;
     let sum = |bytes: fn(&ObjectPages) -> usize| objects.iter().map(bytes).sum::<usize>();
     let table = write_objects(&records);
     let lengths = [
@@ -64,48 +62,19 @@ pub(crate) fn assemble(
         [with_ids, has_duplicates, !provenance.is_empty(), !instances.is_empty(), topology_bytes > 0];
     let sections = 3 + optional.into_iter().filter(|&is_there| is_there).count();
     output.append(Arc::new(vec![0; head_bytes(sections)]))?;
-    let triangles = records.iter().map(|(_, record)| record.triangles.get()).sum();
-    let tally = progress.tally(Step::Bake(Stage::Encode), WHOLE, triangles, expected);
-    let mut file = Sections { output, table: Vec::new(), content: ContentHasher::default(), tally };
+    let mut file = Sections { output, table: Vec::new(), content: ContentHasher::default() };
     file.section(SectionKind::Objects, lengths[0], |section| section.write(table))?;
     let (mut leaves, mut ids) = (Vec::new(), Vec::new());
     file.section(SectionKind::Nodes, lengths[1], |section| {
-        let mut place = PagePlace::default();
-        for ObjectPages { profile, parts, parents } in objects {
-            let numbering = Numbering { profile, parents, first: place.page };
-            place = place.of_next_object();
-            let mut pages = Vec::new();
-            for UnnumberedPages { pages: own, leaves: own_leaves, ids: own_ids } in parts {
-                pages.push(own);
-                leaves.push(own_leaves);
-                ids.push(own_ids);
-            }
-            in_batches(pages, |mut batch| {
-                numbering.number(&mut batch, &mut place);
-                batch.into_iter().try_for_each(|pages| section.write(pages))
-            })?;
-        }
-        Ok(())
+        write_nodes(section, objects, &mut leaves, &mut ids)
     })?;
-    let blocks = |section: &mut OpenSection, pieces: Vec<Piece<u8>>| {
-        in_batches(pieces, |batch| batch.into_iter().try_for_each(|blocks| section.write(blocks)))
-    };
-    file.section(SectionKind::Leaves, lengths[2], |section| blocks(section, leaves))?;
+    file.section(SectionKind::Leaves, lengths[2], |section| write_blocks(section, leaves))?;
     if with_ids {
-        file.section(SectionKind::Ids, lengths[3], |section| blocks(section, ids))?;
+        file.section(SectionKind::Ids, lengths[3], |section| write_blocks(section, ids))?;
     }
     if has_duplicates {
-        file.section(SectionKind::Duplicates, duplicates.count() as usize * 8, |section| {
-            let mut bytes = Vec::new();
-            duplicates.visit(|pair| {
-                pair.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
-                if bytes.len() >= 1 << 20 {
-                    section.write(std::mem::take(&mut bytes))?;
-                }
-                Ok(())
-            })?;
-            section.write(bytes)
-        })?;
+        let length = duplicates.count() as usize * 8;
+        file.section(SectionKind::Duplicates, length, |section| write_duplicates(section, duplicates))?;
     }
     if !provenance.is_empty() {
         let text = provenance.as_bytes();
@@ -115,21 +84,70 @@ pub(crate) fn assemble(
         file.section(SectionKind::Instances, instances.len(), |section| section.write(instances))?;
     }
     if topology_bytes > 0 {
-        topology.components.finish(&spill)?;
-        topology.nets.finish(&spill)?;
         file.section(SectionKind::Topology, topology_bytes, |section| {
-            section.write(write_topology_head(&topology.records))?;
-            for piece in topology.components.pieces() {
-                section.write(little_endian(&piece.all()?))?;
-            }
-            let nets = topology.nets.pieces();
-            nets.iter().try_for_each(|piece| section.write(little_endian(piece.all()?.as_flattened())))
+            write_topology(section, topology, &spill)
         })?;
     }
     file.align(LINE)?;
     let Sections { table, content, .. } = file;
     let header = write_header(output.length(), content.finish(), &table);
     output.replace_first(header)
+}
+
+/// Numbers the pages of all objects and writes them. Lists their leaf blocks and id blocks, which follow later in the file.
+fn write_nodes(
+    section: &mut OpenSection,
+    objects: Vec<ObjectPages>,
+    leaves: &mut Vec<Piece<u8>>,
+    ids: &mut Vec<Piece<u8>>,
+) -> Result<(), BakeError> {
+    let mut place = PagePlace::default();
+    for ObjectPages { profile, parts, parents } in objects {
+        let numbering = Numbering { profile, parents, first: place.page };
+        place = place.of_next_object();
+        let mut pages = Vec::new();
+        for part in parts {
+            pages.push(part.pages);
+            leaves.push(part.leaves);
+            ids.push(part.ids);
+        }
+        in_batches(pages, |mut batch| {
+            numbering.number(&mut batch, &mut place);
+            batch.into_iter().try_for_each(|pages| section.write(pages))
+        })?;
+    }
+    Ok(())
+}
+
+fn write_blocks(section: &mut OpenSection, pieces: Vec<Piece<u8>>) -> Result<(), BakeError> {
+    in_batches(pieces, |batch| batch.into_iter().try_for_each(|blocks| section.write(blocks)))
+}
+
+fn write_duplicates(section: &mut OpenSection, duplicates: Sorter<[u32; 2]>) -> Result<(), BakeError> {
+    let mut bytes = Vec::new();
+    duplicates.visit(|pair| {
+        pair.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
+        if bytes.len() >= 1 << 20 {
+            section.write(std::mem::take(&mut bytes))?;
+        }
+        Ok(())
+    })?;
+    section.write(bytes)
+}
+
+fn write_topology(
+    section: &mut OpenSection,
+    mut topology: TopologyLists,
+    spill: &Spill,
+) -> Result<(), BakeError> {
+    topology.components.finish(spill)?;
+    topology.nets.finish(spill)?;
+    section.write(write_topology_head(&topology.records))?;
+    for piece in topology.components.pieces() {
+        section.write(little_endian(&piece.all()?))?;
+    }
+    let nets = topology.nets.pieces();
+    nets.iter().try_for_each(|piece| section.write(little_endian(piece.all()?.as_flattened())))
 }
 
 fn little_endian(numbers: &[u32]) -> Vec<u8> {
@@ -160,9 +178,8 @@ fn in_batches(
 struct Sections<'a> {
     output: &'a mut Output,
     table: Vec<Section>,
-    content: ContentHasher,
     /// The hasher over the bytes of all sections.
-    tally: Tally<'a>,
+    content: ContentHasher,
 }
 
 impl Sections<'_> {
@@ -185,9 +202,8 @@ impl Sections<'_> {
             self.content.begin(kind, length as u64);
         }
         let content = kind.is_content().then_some(&mut self.content);
-        let (output, tally) = (&mut *self.output, &self.tally);
-        let waiting = Vec::new();
-        let mut section = OpenSection { output, checksum: Hasher::default(), content, tally, waiting };
+        let output = &mut *self.output;
+        let mut section = OpenSection { output, checksum: Hasher::default(), content, waiting: Vec::new() };
         write(&mut section)?;
         section.flush()?;
         let checksum = section.checksum.finish();
@@ -204,7 +220,6 @@ struct OpenSection<'a> {
     output: &'a mut Output,
     checksum: Hasher,
     content: Option<&'a mut ContentHasher>,
-    tally: &'a Tally<'a>,
     /// Bytes that are too few to be written yet.
     waiting: Vec<u8>,
 }
@@ -221,8 +236,7 @@ impl OpenSection<'_> {
 
     /// Writes the bytes that wait.
     fn flush(&mut self) -> Result<(), BakeError> {
-        let Self { output, checksum, content, tally, waiting } = self;
-        tally.add(waiting.len() as u64);
+        let Self { output, checksum, content, waiting } = self;
         let bytes = Arc::new(std::mem::take(waiting));
         let hash_content = || {
             if let Some(content) = content {

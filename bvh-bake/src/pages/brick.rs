@@ -133,7 +133,7 @@ fn encode_brick(
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
     let mut arena = cut_brick(&tree, triangles, width, slabs, &style.behind, !style.is_cloud);
-    if style.turning_slabs {
+    if style.profile.has_turning_slabs() && !style.is_cloud {
         turning::fit(&mut arena, triangles, style.behind.left_out);
     }
     drop(tree);

@@ -17,7 +17,6 @@ pub(crate) struct Style {
     pub(crate) encoding: TriangleEncoding,
     pub(crate) f16_scale: f32,
     pub(crate) ids: bool,
-    pub(crate) turning_slabs: bool,
     /// Whether all triangles are points.
     pub(crate) is_cloud: bool,
     /// How vertices follow from offsets.

@@ -9,7 +9,6 @@
 //! times as long.
 
 use crate::error::{BakeError, LimitError};
-use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
 use crate::threads;
@@ -53,13 +52,17 @@ impl PartialOrd for Hashed {
 /// hash.
 const BITS_PER_HASH: usize = 8;
 
-/// A triangle that shares its hash with another: its corners in a fixed order, then its place in the stream, its id and its [`Turn`].
-pub(crate) type Suspect = [u64; 12];
-/// The words of the corners in a [`Suspect`], and the positions of its place, its id and its turn.
-const CORNERS: std::ops::Range<usize> = 0..9;
-const PLACE: usize = 9;
-const ID: usize = 10;
-const TURN: usize = 11;
+/// A triangle that shares its hash with another. Suspects are sorted by their fields, the first one first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Suspect {
+    /// The corners in a fixed order.
+    corners: [End; 3],
+    /// The place in the stream.
+    place: u64,
+    id: u64,
+    turn: Turn,
+}
 
 /// 1 if a triangle goes around its corners against their fixed order, else 0. Where corners are equal it is 0, because
 /// the triangle goes around them in both ways.
@@ -116,9 +119,9 @@ impl Group {
         if net.abs() > MAX_NET {
             return Err(LimitError::EqualTriangles.into());
         }
-        let [a, b, c] = [0, 3, 6].map(|at| [kept[at], kept[at + 1], kept[at + 2]]);
-        let corners = if kept[TURN] == 0 { [a, b, c] } else { [a, c, b] };
-        found(Found::Net { id: kept[ID] as u32, net: net as i32, corners })
+        let [a, b, c] = kept.corners;
+        let corners = if kept.turn == 0 { [a, b, c] } else { [a, c, b] };
+        found(Found::Net { id: kept.id as u32, net: net as i32, corners })
     }
 }
 
@@ -145,28 +148,21 @@ fn drop_single(hashes: &mut Vec<Hashed>) {
 }
 
 /// Finds the places of duplicates from the hashes of all triangles, as one bit per triangle, or no bits at all if there
-/// are no duplicates. Passes the pairs and the nets to `found`. Sorts `run` records at a time. `tally` counts the triangles.
+/// are no duplicates. Passes the pairs and the nets to `found`. Sorts `run` records at a time.
 pub(crate) fn find(
     stream: &TriangleStream,
     mut hashes: Sorter<Hashed>,
     run: usize,
     spill: &Spill,
-    tally: &Tally,
     mut found: impl FnMut(Found) -> Result<(), BakeError>,
 ) -> Result<Vec<u64>, BakeError> {
     let words = stream.count.div_ceil(64) as usize;
     let mut shared: Vec<u64> = Vec::new();
     let mut last: Option<Hashed> = None;
-    let mut visited = 0;
     if let Some(hashes) = hashes.in_memory() {
         drop_single(hashes);
-        tally.add(stream.count);
     }
     hashes.visit(|hashed| {
-        visited += 1;
-        if visited % TRIANGLES_PER_PART == 0 {
-            tally.add(TRIANGLES_PER_PART as u64);
-        }
         if let Some(last) = last.filter(|last| last.hash() == hashed.hash()) {
             shared.resize(words, 0);
             [last.place(), hashed.place()].into_iter().for_each(|place| set(&mut shared, place));
@@ -191,11 +187,11 @@ pub(crate) fn find(
     // Of equal triangles, the one with the first place is kept.
     let mut last: Option<Group> = None;
     suspects.visit(|suspect| match &mut last {
-        Some(Group { kept, net }) if kept[CORNERS] == suspect[CORNERS] => {
+        Some(Group { kept, net }) if kept.corners == suspect.corners => {
             any = true;
-            set(&mut dropped, suspect[PLACE] as u32);
-            *net += if kept[TURN] == suspect[TURN] { 1 } else { -1 };
-            found(Found::Pair([kept[ID] as u32, suspect[ID] as u32]))
+            set(&mut dropped, suspect.place as u32);
+            *net += if kept.turn == suspect.turn { 1 } else { -1 };
+            found(Found::Pair([kept.id as u32, suspect.id as u32]))
         }
         _ => {
             let next = Group { kept: *suspect, net: 1 };
@@ -218,13 +214,8 @@ fn of_part(stream: &TriangleStream, part: usize, shared: &[u64]) -> Result<Vec<S
         if words[place / 64] >> (place % 64) & 1 == 0 {
             return None;
         }
-        let mut suspect = [0; 12];
         let (corners, turn) = canonical(ends(triangle, triangles.exact.get(place)));
-        suspect[CORNERS].copy_from_slice(corners.as_flattened());
-        suspect[TURN] = turn;
-        suspect[PLACE] = (first + place) as u64;
-        suspect[ID] = triangle.id.into();
-        Some(suspect)
+        Some(Suspect { corners, place: (first + place) as u64, id: triangle.id.into(), turn })
     };
     Ok(triangles.iter().enumerate().filter_map(suspect).collect())
 }
@@ -236,7 +227,7 @@ fn set(bits: &mut [u64], place: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::{Progress, Stage, Step};
+    use crate::progress::Progress;
     use crate::storage::Scratch;
     use crate::triangles::{Part, Triangle};
 
@@ -263,9 +254,8 @@ mod tests {
         let stream = TriangleStream { parts, count: count.into(), placement: None };
         let mut hashes = Sorter::of_runs(count as usize);
         (0..count).for_each(|place| hashes.extend(&[Hashed([7, 7, place])], &spill).unwrap());
-        let tally = progress.tally(Step::Bake(Stage::Prepare), 1, count.into(), count.into());
         let mut pairs = Vec::new();
-        let dropped = find(&stream, hashes, count as usize, &spill, &tally, |found| {
+        let dropped = find(&stream, hashes, count as usize, &spill, |found| {
             if let Found::Pair(pair) = found {
                 pairs.push(pair);
             }

@@ -18,11 +18,6 @@ use crate::triangles::{Corners, Exact, Kept, TRIANGLES_PER_PART, TriangleStream,
 use bvh_format::vertex::Vertices;
 use duplicates::{Found, Hashed, Suspect};
 
-/// The shares of the passes in the stage's work, in sixteenths: measuring, finding duplicates, and surveying.
-const MEASURE_WEIGHT: u64 = 8;
-const DUPLICATES_WEIGHT: u64 = 4;
-const SURVEY_WEIGHT: u64 = 4;
-
 /// The results of the first pass.
 pub(crate) struct Measured {
     pub(crate) moved: Moved,
@@ -45,9 +40,6 @@ pub(crate) fn measure(
     let mut hashes = Sorter::of_runs(resources.sorted_at_once::<Hashed>(stream.count));
     let mut moved = Moved::default();
     let (mut bounds, mut centres) = (Aabb::EMPTY, Aabb::EMPTY);
-    let tally =
-        |weight| resources.progress.tally(Step::Bake(Stage::Prepare), weight, stream.count, stream.count);
-    let measuring = tally(MEASURE_WEIGHT);
     let batch = 4 * threads::current_num_threads();
     for start in (0..stream.parts()).step_by(batch) {
         let parts = start..(start + batch).min(stream.parts());
@@ -63,7 +55,7 @@ pub(crate) fn measure(
                     hashes.push(duplicates::hashed(&triangle.corners, place));
                 }
             }
-            measuring.add(triangles.len() as u64);
+            resources.progress.add(Step::Bake(Stage::Prepare), triangles.len() as u64);
             Ok::<_, BakeError>((moved, bounds, centres, hashes))
         };
         for part in threads::map(parts, of_part) {
@@ -74,13 +66,11 @@ pub(crate) fn measure(
             hashes.extend(&part_hashes, &spill)?;
         }
     }
-    let counted = tally(DUPLICATES_WEIGHT);
     let dropped = if is_cloud {
-        counted.add(stream.count);
         Vec::new()
     } else {
         let run = resources.sorted_at_once::<Suspect>(stream.count);
-        duplicates::find(stream, hashes, run, &spill, &counted, found)?
+        duplicates::find(stream, hashes, run, &spill, found)?
     };
     Ok(Measured { moved, bounds, centres, dropped })
 }
@@ -102,8 +92,6 @@ pub(crate) fn survey(
     behind: &Vertices,
     resources: &Resources,
 ) -> Result<Surveyed, BakeError> {
-    let tally =
-        resources.progress.tally(Step::Bake(Stage::Prepare), SURVEY_WEIGHT, kept.count(), kept.count());
     let (bounds, left_out) = (&measured.bounds, behind.left_out.map(f64::from));
     let most_left_out = left_out.into_iter().fold(0.0, f64::max);
     let centre = [0, 1, 2].map(|a| ((f64::from(bounds.lo(a)) + f64::from(bounds.hi(a))) / 2.0) as f32);
@@ -137,7 +125,7 @@ pub(crate) fn survey(
                 grid.add(&Aabb::of_triangle(&triangle.corners));
             }
         }
-        tally.add(triangles.len() as u64);
+        resources.progress.add(Step::Bake(Stage::Prepare), triangles.len() as u64);
         Ok(())
     };
     let mut all = Surveyed { centre, radius: 0.0, degenerate: 0, grid: None };

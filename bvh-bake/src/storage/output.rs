@@ -8,7 +8,7 @@
 //! given.
 
 use crate::error::BakeError;
-use crate::progress::Progress;
+use crate::progress::{Progress, Stage, Step};
 use crate::storage::atomic::{Temporary, failed};
 use crate::storage::{read_exact_at, write_all_at};
 use bvh_format::source::Source;
@@ -64,10 +64,11 @@ impl Output {
         }
     }
 
-    /// Reserves room for the given number of bytes.
+    /// Reserves room for the given number of bytes, and expects them as the work of [`Stage::Encode`].
     pub(crate) fn expect(&mut self, length: u64) {
-        if let Self::Memory(bytes) = self {
-            bytes.reserve_exact((length as usize).saturating_sub(bytes.len()));
+        match self {
+            Self::Memory(bytes) => bytes.reserve_exact((length as usize).saturating_sub(bytes.len())),
+            Self::File(file) => file.progress.expect(Step::Bake(Stage::Encode), length),
         }
     }
 
@@ -144,6 +145,7 @@ impl OutputFile {
     /// Writes bytes at an offset, or passes them to the writer thread.
     fn write(&self, at: u64, bytes: Arc<Vec<u8>>) -> Result<(), BakeError> {
         self.progress.add_output_written(bytes.len() as u64);
+        self.progress.add(Step::Bake(Stage::Encode), bytes.len() as u64);
         match &self.writer {
             Some(writer) => {
                 writer.write(at, bytes);

@@ -1,7 +1,6 @@
 //! A binary tree in one array: nodes need no allocation each, and nodes that are visited together are stored together.
 
 use super::boxes::Aabb;
-use super::{PACKET, PacketTriangles};
 
 /// The place of a node in its tree's array.
 pub(crate) type NodeIndex = u32;
@@ -125,45 +124,6 @@ impl<L> Tree<L> {
             Content::Leaf(_) => None,
             Content::Inner(children) => Some(children),
         }
-    }
-}
-
-impl Tree<PacketTriangles> {
-    /// Returns the number of nodes.
-    pub(crate) fn node_count(&self) -> usize {
-        self.nodes.len()
-    }
-
-    /// Returns the numbers of the triangles below the lowest node around another one that has at least `least` of them; or
-    /// below its child, if the node has more than `most`.
-    pub(crate) fn triangles_around(&self, mut node: NodeIndex, least: usize, most: usize) -> Vec<u32> {
-        while let Some([left, _]) = self.children(node) {
-            node = left;
-        }
-        let mut numbers = self.triangles_below(node, most).unwrap_or_default();
-        while numbers.len() < least && self.at(node).parent != NONE {
-            node = self.at(node).parent;
-            match self.triangles_below(node, most) {
-                Some(more) => numbers = more,
-                None => break,
-            }
-        }
-        numbers
-    }
-
-    /// Returns the numbers of the triangles below a node, unless there are more than `most`, or than a packet has.
-    fn triangles_below(&self, node: NodeIndex, most: usize) -> Option<Vec<u32>> {
-        let (mut numbers, mut stack) = (Vec::new(), vec![node]);
-        while let Some(node) = stack.pop() {
-            match &self.at(node).content {
-                Content::Leaf(packet) => numbers.extend_from_slice(packet.numbers()),
-                Content::Inner(children) => stack.extend(children),
-            }
-            if numbers.len() > most.max(PACKET) {
-                return None;
-            }
-        }
-        Some(numbers)
     }
 }
 

@@ -13,7 +13,6 @@ use super::Builder;
 use super::binary::Tree;
 use super::boxes::{Aabb, Binning, Cost};
 use crate::error::BakeError;
-use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::storage::resources::Resources;
 use crate::triangles::{BatchStream, Grouped, InStream, Triangle, Triangles, distribute, fold};
@@ -40,8 +39,6 @@ pub(super) struct Division<'a> {
     pub(super) builder: &'a Builder,
     pub(super) resources: &'a Resources,
     pub(super) spill: &'a Spill,
-    /// Counts each triangle once, even if it is divided again.
-    pub(super) tally: &'a Tally<'a>,
     pub(super) bricks: Vec<BatchStream>,
     /// A box of the triangles of each brick.
     pub(super) boxes: Vec<Aabb>,
@@ -64,7 +61,6 @@ impl Division<'_> {
                 |part| Ok(Grouped::new(triangles.part(part)?, 1, |_, _| 0)),
                 &mut brick,
                 self.spill,
-                self.tally,
             )?;
             self.bricks.append(&mut brick);
             self.boxes.push(*bounds);
@@ -88,7 +84,7 @@ impl Division<'_> {
             };
             Ok(Grouped::new(triangles.part(part)?, parts.counts.len(), group))
         };
-        distribute(triangles.parts(), make, &mut streams, self.spill, self.tally)?;
+        distribute(triangles.parts(), make, &mut streams, self.spill)?;
         let boxes = parts.boxes;
         drop((grid, parts.of_cell));
         let mut streams = streams.into_iter().zip(&boxes);
@@ -124,7 +120,7 @@ impl Division<'_> {
             let right = |place: usize, _: &Triangle| u32::from(firsts[part] + place as u64 >= half);
             Ok(Grouped::new(triangles.part(part)?, 2, right))
         };
-        distribute(triangles.parts(), make, &mut halves, self.spill, self.tally)?;
+        distribute(triangles.parts(), make, &mut halves, self.spill)?;
         let [left, right] = <[_; 2]>::try_from(halves).ok().expect("a stream for each half");
         Ok([left, right])
     }
@@ -274,7 +270,7 @@ fn best_plane(cells: &[Cell], parent: &Aabb, treelet: usize) -> Option<(usize, u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::{Progress, Step};
+    use crate::progress::Progress;
     use crate::tree::binary::{Content, NodeIndex};
     use crate::triangles::{Batch, Corners};
 
@@ -297,20 +293,13 @@ mod tests {
     fn divided(corners: &[Corners], builder: &Builder) -> (Vec<Vec<u32>>, Tree<BrickIndex>) {
         let progress = Progress::default();
         let resources = Resources::unlimited(&progress);
-        let tally = progress.tally(Step::Read, 0, 0, 0);
         let spill = resources.scratch.spill();
-        let mut all = BatchStream::empty();
+        let mut all = BatchStream::several(&resources, &[corners.len() as u64], false).remove(0);
         let triangles = corners.iter().zip(0..).map(|(&corners, id)| Triangle { corners, id });
         all.append(&spill, &Batch::of(triangles.collect::<Vec<_>>())).unwrap();
         all.finish(&spill).unwrap();
-        let mut division = Division {
-            builder,
-            resources: &resources,
-            spill: &spill,
-            tally: &tally,
-            bricks: Vec::new(),
-            boxes: Vec::new(),
-        };
+        let mut division =
+            Division { builder, resources: &resources, spill: &spill, bricks: Vec::new(), boxes: Vec::new() };
         let bounds_of = |triangles: &mut dyn Iterator<Item = &Corners>| {
             let mut bounds = Aabb::EMPTY;
             triangles.for_each(|corners| bounds.join(&Aabb::of_triangle(corners)));

@@ -19,7 +19,7 @@ pub(crate) mod turning;
 
 use crate::error::BakeError;
 use crate::options::Effort;
-use crate::progress::{Stage, Step, Tally, WHOLE};
+use crate::progress::{Stage, Step};
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
 use crate::threads;
 use crate::triangles::{Batch, BatchStream, Kept, Triangle};
@@ -31,11 +31,6 @@ pub(crate) use bricks::{BrickIndex, Grid};
 use bvh_format::leaf::{PACKET, order_of_lanes};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard};
-
-/// The shares of two passes over the triangles in the stage's work, in parts of [`WHOLE`]: dividing them into bricks,
-/// and building the bricks' trees. The rest is the encoding.
-const DIVIDE_WEIGHT: u64 = 2;
-const TREES_WEIGHT: u64 = 9;
 
 /// Returns true if `triangles` triangles make a single brick.
 pub(crate) fn is_one_brick(triangles: u64) -> bool {
@@ -85,8 +80,6 @@ pub(crate) struct Bricks {
     boxes: Vec<Aabb>,
     top: Tree<BrickIndex>,
     builder: Builder,
-    /// The brick whose tree is built, if one is: its number, the tree and its triangles.
-    first: Option<(usize, Tree<PacketTriangles>, Batch<'static>)>,
 }
 
 impl Bricks {
@@ -102,13 +95,11 @@ impl Bricks {
     ) -> Result<Self, BakeError> {
         let builder = Builder::new(width, effort);
         let spill = resources.scratch.spill();
-        let tally = tally(resources, DIVIDE_WEIGHT, triangles.count());
         let (bricks, boxes) = (Vec::new(), Vec::new());
-        let mut division =
-            Division { builder: &builder, resources, spill: &spill, tally: &tally, bricks, boxes };
+        let mut division = Division { builder: &builder, resources, spill: &spill, bricks, boxes };
         let top = division.divide(triangles, triangles.count(), bounds, grid)?;
         let (bricks, boxes) = (division.bricks, division.boxes);
-        Ok(Self { bricks, boxes, top, builder, first: None })
+        Ok(Self { bricks, boxes, top, builder })
     }
 
     /// Returns a box of the triangles of each brick.
@@ -116,65 +107,33 @@ impl Bricks {
         &self.boxes
     }
 
-    /// Builds the tree of the largest brick, on all threads. Returns it with the brick's triangles, which its packets number.
-    pub(crate) fn first_tree(
-        &mut self,
-        resources: &Resources,
-    ) -> Result<(&Tree<PacketTriangles>, &[Triangle]), BakeError> {
-        let trees = tally(resources, TREES_WEIGHT, self.triangles());
-        // Of equal bricks, the first one is taken.
-        let largest = (0..self.bricks.len()).rev().max_by_key(|&number| self.bricks[number].count());
-        let number = largest.expect("an object has triangles");
-        let brick = std::mem::replace(&mut self.bricks[number], BatchStream::empty());
-        let (tree, triangles) = self.builder.tree_of_brick(brick, &trees)?;
-        let (_, tree, triangles) = self.first.insert((number, tree, triangles));
-        Ok((tree, triangles))
-    }
-
-    /// Returns the number of triangles of all bricks.
-    fn triangles(&self) -> u64 {
-        let first = self.first.as_ref().map_or(0, |(.., triangles)| triangles.len() as u64);
-        first + self.bricks.iter().map(BatchStream::count).sum::<u64>()
-    }
-
-    /// Builds the tree of each brick, but for the first one, and passes all to `make` with the number of the brick, several
-    /// bricks at a time. Returns the results of `make` by brick, and the tree above the bricks. Packets number the triangles
-    /// of their brick.
+    /// Builds the tree of each brick and passes it to `make` with the number of the brick, several bricks at a time. Returns
+    /// the results of `make` by brick, and the tree above the bricks. Packets number the triangles of their brick.
     pub(crate) fn build<T: Send>(
         self,
         resources: &Resources,
         make: impl Fn(usize, Tree<PacketTriangles>, &Batch) -> Result<T, BakeError> + Sync,
     ) -> Result<(Vec<T>, Tree<BrickIndex>), BakeError> {
-        let triangles = self.triangles();
-        let Self { bricks, top, builder, first, .. } = self;
+        let Self { bricks, top, builder, .. } = self;
         let count = bricks.len();
-        let (trees, rest) = (
-            tally(resources, TREES_WEIGHT, triangles),
-            tally(resources, WHOLE - DIVIDE_WEIGHT - TREES_WEIGHT, triangles),
-        );
-        let first_number = first.as_ref().map(|(number, ..)| *number);
         // The largest bricks come first, so that few threads wait for the last one.
         let mut order: Vec<usize> = (0..count).collect();
-        order
-            .sort_by_key(|&number| (Some(number) != first_number, std::cmp::Reverse(bricks[number].count())));
+        order.sort_by_key(|&number| std::cmp::Reverse(bricks[number].count()));
         let bricks: Vec<_> = bricks.into_iter().map(|brick| Mutex::new(Some(brick))).collect();
         let made: Vec<_> = (0..count).map(|_| Mutex::new(None)).collect();
-        let tree_of = |number: usize| {
+        let make = |number: usize| {
             let brick = locked(&bricks[number]).take().expect("each brick is built once");
-            builder.tree_of_brick(brick, &trees)
+            let (tree, triangles) = builder.tree_of_brick(brick)?;
+            let done = || resources.progress.add(Step::Bake(Stage::Build), triangles.len() as u64);
+            done();
+            let made = make(number, tree, &triangles)?;
+            done();
+            Ok::<T, BakeError>(made)
         };
-        let first = Mutex::new(first.map(|(_, tree, triangles)| (tree, triangles)));
         let next = AtomicUsize::new(0);
         let work = || {
             while let Some(&number) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let is_first = Some(number) == first_number;
-                let built =
-                    is_first.then(|| locked(&first).take().expect("the first brick is passed on once"));
-                let result = built.map_or_else(|| tree_of(number), Ok).and_then(|(tree, triangles)| {
-                    let made = make(number, tree, &triangles)?;
-                    rest.add(triangles.len() as u64);
-                    Ok(made)
-                });
+                let result = make(number);
                 if result.is_err() {
                     // The other loops end after their current brick.
                     next.fetch_add(count, Ordering::Relaxed);
@@ -196,17 +155,6 @@ impl Bricks {
 /// Locks what threads share. They only put something in or take it out while they hold the lock.
 fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().expect("no thread panics while it holds the lock")
-}
-
-/// Starts a tally of a pass over `triangles` triangles.
-fn tally(resources: &Resources, weight: u64, triangles: u64) -> Tally<'_> {
-    resources.progress.tally(Step::Bake(Stage::Build), weight, triangles, triangles)
-}
-
-/// Builds the tree of triangles that are a brick.
-#[cfg(test)]
-pub(crate) fn tree_of(triangles: &[Triangle], width: usize, effort: Effort) -> Tree<PacketTriangles> {
-    Builder::new(width, effort).tree(triangles)
 }
 
 struct Builder {
@@ -233,7 +181,6 @@ impl Builder {
     fn tree_of_brick(
         &self,
         brick: BatchStream,
-        trees: &Tally,
     ) -> Result<(Tree<PacketTriangles>, Batch<'static>), BakeError> {
         let triangles = brick.take()?;
         let mut tree = self.tree(&triangles);
@@ -244,7 +191,6 @@ impl Builder {
             order.extend_from_slice(packet.numbers());
             *packet = PacketTriangles::new(first..order.len() as u32);
         }
-        trees.add(triangles.len() as u64);
         Ok((tree, triangles.at(order.iter().map(|&number| number as usize))))
     }
 

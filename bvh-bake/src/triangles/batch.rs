@@ -62,10 +62,6 @@ impl BatchStream {
             .collect()
     }
 
-    pub(crate) fn empty() -> Self {
-        Self { triangles: Stream::of_pieces(1), exact: Stream::of_pieces(1) }
-    }
-
     pub(crate) fn count(&self) -> u64 {
         self.triangles.count()
     }

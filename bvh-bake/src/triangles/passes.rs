@@ -2,7 +2,6 @@
 
 use super::{Batch, BatchStream, TRIANGLES_PER_PART, Triangle, Triangles};
 use crate::error::BakeError;
-use crate::progress::Tally;
 use crate::storage::Spill;
 use crate::threads;
 use std::ops::Range;
@@ -73,13 +72,12 @@ impl<'a> Grouped<'a> {
 }
 
 /// Groups each part by `make` and appends each group to its stream, in the order of the parts. Then finishes the
-/// streams. `tally` counts the triangles.
+/// streams.
 pub(crate) fn distribute<'a>(
     parts: usize,
     make: impl Fn(usize) -> Result<Grouped<'a>, BakeError> + Sync,
     streams: &mut [BatchStream],
     spill: &Spill,
-    tally: &Tally,
 ) -> Result<(), BakeError> {
     // Only this many parts are in memory at the same time.
     let batch = 4 * threads::current_num_threads();
@@ -90,7 +88,6 @@ pub(crate) fn distribute<'a>(
             made.iter().try_for_each(|part| part.append_to(group, stream, spill))
         };
         threads::map(streams.iter_mut().enumerate(), append).into_iter().collect::<Result<(), _>>()?;
-        tally.add(made.iter().map(|part| part.triangles.len() as u64).sum());
     }
     threads::map(streams, |stream| stream.finish(spill)).into_iter().collect()
 }

@@ -55,8 +55,6 @@ pub(crate) struct Gathered {
     pub(crate) moved: Moved,
     /// How far welding moved vertices before that.
     pub(crate) welded: Moved,
-    /// The number of distinct vertices that the input's triangles refer to.
-    pub(crate) vertices: u64,
     /// Whether all triangles are points.
     pub(crate) is_cloud: bool,
 }

@@ -9,12 +9,10 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::ObjectRecord;
 use bvh_format::page::{PAGE, Page, TightBound};
 use bvh_format::profile::{Encoding, Profile};
-use bvh_format::turning::{DIRECTION_ROW, END_ROW};
 use bvh_format::validate::validate;
 use bvh_format::{Layout, Rule};
 use cbvh_testkit::ball::ball;
 use cbvh_testkit::loosen::{Node, move_sphere, remote_roots, rewritten, widen};
-use cbvh_testkit::seal::{seal, section};
 use cbvh_testkit::{Random, Triangle};
 use std::path::Path;
 
@@ -467,35 +465,5 @@ fn the_meshes_of_testdata_bake() {
         let mesh =
             input::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../testdata").join(name)).unwrap();
         bake_all(&mesh);
-    }
-}
-
-/// Without turning slabs a file has zeros in their place, and differs in nothing else but the options that it names.
-#[test]
-fn turning_slabs_can_be_left_out() {
-    let profile = Profile::Dop26U8Wide;
-    let (positions, triangles) = ball(3000);
-    let mesh = Mesh::from_triangles(positions, triangles);
-    let [mut with, without] = [true, false].map(|slabs| {
-        let options =
-            Options::default().profile(profile).triangles(TriangleEncoding::F32).turning_slabs(slabs);
-        to_bytes(&mesh, &options).unwrap().0
-    });
-    let mut removed = 0;
-    for page in section(&with, 2).step_by(4096) {
-        let (line, treelets) = (usize::from(with[page + 61]), usize::from(with[page + 59]));
-        for treelet in 0..treelets {
-            let treelet = &mut with[page + 64 * line + treelet * profile.treelet_bytes()..];
-            for row in [END_ROW, DIRECTION_ROW, 16 + END_ROW, 16 + DIRECTION_ROW] {
-                let codes = &mut treelet[4 * row..4 * row + 4];
-                removed += codes.iter().filter(|&&code| code != 0).count();
-                codes.fill(0);
-            }
-        }
-    }
-    assert!(removed > 3000 / 8, "{removed} bytes of turning slabs");
-    seal(&mut with);
-    for kind in [2, 3] {
-        assert!(with[section(&with, kind)] == without[section(&without, kind)], "section {kind}");
     }
 }

@@ -105,7 +105,7 @@ fn welding_is_not_transitive() {
     let all: HashMap<u32, Triangle> = stored(&bytes).into_iter().map(|of| (of.id, of.corners)).collect();
     assert_eq!(all[&0], [row(0.0), row(0.0), row(1.0)]);
     assert_eq!(all[&1], [row(2.0), far, [9.0; 3]]);
-    assert_eq!((report.file.triangles, report.file.degenerate, report.vertices), (2, 1, 6));
+    assert_eq!((report.file.triangles, report.file.degenerate), (2, 1));
     // The vertex that a triangle uses first is the first, wherever it is.
     let turned = [[row(2.0), row(1.0), row(0.0)], [row(3.0), far, [9.0; 3]]];
     let (bytes, _) = to_bytes(&mesh(&turned), &Options::default().weld(1.0)).unwrap();

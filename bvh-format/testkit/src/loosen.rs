@@ -2,7 +2,7 @@
 //! residuals. Triangles and the shape of the tree stay as they are, so that where bounds become looser, answers must stay, too.
 
 use crate::Random;
-use crate::seal::{put, put_together, section, take_apart};
+use crate::seal::{put, put_together, seal, section, take_apart};
 use bvh_format::Layout;
 use bvh_format::bounds::{Bound, Subtree, visit_bounds};
 use bvh_format::kdop::Kdop;
@@ -10,8 +10,9 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::{ObjectRecord, write_objects};
 use bvh_format::page::decode::decode_child;
 use bvh_format::page::{PAGE, Page, PageWriter, RootRef, TightBound};
-use bvh_format::profile::Encoding;
+use bvh_format::profile::{Encoding, Profile};
 use bvh_format::treelet::Child;
+use bvh_format::turning::{DIRECTION_ROW, END_ROW};
 use bvh_format::vertex::Vertices;
 use std::collections::BTreeMap;
 use zerocopy::IntoBytes;
@@ -35,6 +36,22 @@ pub fn end(bound: &Kdop, slab: usize, upper: bool) -> f32 {
 pub fn widen(bound: &mut Kdop, slab: usize, upper: bool, to: f32) {
     let to = end(bound, slab, upper).max(to);
     if upper { bound.hi[slab] = to } else { bound.lo[slab] = -to }
+}
+
+/// Returns a file of the profile dop26-u8-wide without the turning slabs of its children, which zeros in their places stand for.
+pub fn without_turning_slabs(file: &[u8]) -> Vec<u8> {
+    let mut bytes = file.to_vec();
+    for page in section(file, 2).step_by(PAGE) {
+        let (line, treelets) = (usize::from(file[page + 61]), usize::from(file[page + 59]));
+        for treelet in 0..treelets {
+            let start = page + 64 * line + treelet * Profile::Dop26U8Wide.treelet_bytes();
+            for row in [END_ROW, DIRECTION_ROW, 16 + END_ROW, 16 + DIRECTION_ROW] {
+                bytes[start + 4 * row..start + 4 * row + 4].fill(0);
+            }
+        }
+    }
+    seal(&mut bytes);
+    bytes
 }
 
 /// Returns the subtree roots of a file of one object that remote links lead to.
@@ -194,7 +211,7 @@ pub fn fill_unused_lanes(bytes: &mut [u8], coordinate: f32) -> usize {
     for &place in &places {
         (0..9).for_each(|value| put(bytes, place + 16 * value, &coordinate.to_le_bytes()));
     }
-    crate::seal::seal(bytes);
+    seal(bytes);
     places.len()
 }
 

@@ -303,8 +303,6 @@ typedef struct cbvh_bake_options {
     int32_t scene;
     /* Leaves out the numbers of the triangles in the input. */
     int32_t no_ids;
-    /* Leaves out the slabs that turn with the surface. */
-    int32_t no_turning_slabs;
     /* Leaves out the topology, which questions about what is inside a mesh need. */
     int32_t no_topology;
     /* Bakes even if the output is up to date. Files only. */
@@ -316,8 +314,6 @@ typedef struct cbvh_bake_options {
     /* Leaves out points without a position, those with a coordinate that is NaN or infinite, which are otherwise refused. Files
      * only. */
     int32_t drop_nan;
-    /* Must be 0. */
-    int32_t reserved;
     /* How coordinates are rounded: "f32" rounds each to the nearest float, ties to even, so that coordinates which are equal in
      * two meshes stay equal; "none" or NULL leaves them. */
     const char *round;

@@ -248,7 +248,6 @@ struct BakeOptions {
     bool split_objects = false;
     bool scene = false;
     bool ids = true;
-    bool turning_slabs = true;
     bool topology = true;
     bool force = false;
     bool solid = false;
@@ -274,7 +273,6 @@ struct BakeOptions {
         options.split_objects = split_objects;
         options.scene = scene;
         options.no_ids = !ids;
-        options.no_turning_slabs = !turning_slabs;
         options.no_topology = !topology;
         options.force = force;
         options.solid = solid;

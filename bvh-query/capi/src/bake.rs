@@ -86,7 +86,6 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
         .split_objects(flag("options.split_objects", given.split_objects)?)
         .scene(flag("options.scene", given.scene)?)
         .ids(!flag("options.no_ids", given.no_ids)?)
-        .turning_slabs(!flag("options.no_turning_slabs", given.no_turning_slabs)?)
         .topology(!flag("options.no_topology", given.no_topology)?)
         .solid(flag("options.solid", given.solid)?)
         .drop_nan(flag("options.drop_nan", given.drop_nan)?)
@@ -95,9 +94,6 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
     let scratch = optional(given.scratch, |folder| unsafe { path("options.scratch", folder) })?;
     let max_memory = Some(given.max_memory).filter(|&bytes| bytes > 0);
     let force = flag("options.force", given.force)?;
-    if given.reserved != 0 {
-        return Err(Failure::argument("options.reserved", "0", given.reserved));
-    }
     let allow_outside = flag("options.allow_outside", given.allow_outside)?;
     Ok(Choices { options, scratch, max_memory, force, allow_outside })
 }

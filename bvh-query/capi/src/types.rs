@@ -63,13 +63,11 @@ structures! {
         split_objects: i32,
         scene: i32,
         no_ids: i32,
-        no_turning_slabs: i32,
         no_topology: i32,
         force: i32,
         solid: i32,
         allow_outside: i32,
         drop_nan: i32,
-        reserved: i32,
         round: *const c_char,
         weld: f64,
     }

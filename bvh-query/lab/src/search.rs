@@ -180,7 +180,6 @@ fn any_layout(random: &mut Random, encodings: usize) -> Options {
     Options::default()
         .profile(Profile::ALL[random.below(Profile::ALL.len())])
         .triangles(encodings[random.below(encodings.len())])
-        .turning_slabs(random.below(4) != 0)
         .effort(Effort::Fast)
         .topology(false)
 }

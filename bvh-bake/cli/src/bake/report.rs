@@ -78,7 +78,6 @@ impl Report {
             triangles: file.triangles,
             degenerate: file.degenerate,
             duplicates: file.duplicates,
-            vertices: baked.map(|baked| baked.vertices),
             objects: file.objects,
             instances: file.instances,
             // The number of closed objects, or null if the file does not state which are.
@@ -130,7 +129,7 @@ impl Report {
             count => format!(" ({} left out)", counted(count, "exact duplicate")),
         };
         line("triangles", format!("{}{left_out}, {} of zero area", file.triangles, file.degenerate));
-        line("vertices", format!("{} in {}", baked.vertices, counted(file.objects, "object")));
+        line("objects", file.objects.to_string());
         if file.instances > 0 {
             line("instances", file.instances.to_string());
         } else if let Some([x, y, z]) = sides(Path::new(&self.output)) {

@@ -6,7 +6,7 @@
 //! file.
 
 use super::InParallel;
-use crate::progress::{Progress, Stage, Step, WHOLE};
+use crate::progress::{Progress, Stage, Step};
 use bvh_format::bounds::{Inflation, Subtree, check_bounds, check_box};
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page, RootRef, check_named_link};
@@ -28,6 +28,7 @@ pub(crate) fn prove<S: Source>(source: &S, progress: &Progress) -> Result<(Layou
         // Records that break a rule break it in `check_sections` as well, whose error comes first.
         let topology = layout.read_topology(source)?;
         let mut inflation = Inflation::default();
+        progress.expect(Step::Bake(Stage::Prove), layout.page_count().into());
         for (number, object) in layout.objects.iter().enumerate() {
             let structure = Structure { topology: topology.get(number) };
             inflation.join(&prove_object(&layout, source, object, Some(structure), progress)?);
@@ -73,8 +74,6 @@ pub(super) fn prove_object<S: Source + ?Sized>(
 ) -> Result<Inflation, S::Error> {
     let pages = object.pages();
     let mut walk = Walk { layout, object, roots: HashMap::new(), inflation: Inflation::default() };
-    let (triangles, count) = (object.triangles(), (pages.end - pages.start).into());
-    let tally = progress.tally(Step::Bake(Stage::Prove), WHOLE, triangles, count);
     let mut counts = Counts::default();
     let (topology, mut boundary) = (structure.as_ref().and_then(|structure| structure.topology), 0u64);
     let closed = topology.is_some_and(|topology| topology.closed);
@@ -97,7 +96,7 @@ pub(super) fn prove_object<S: Source + ?Sized>(
             })?
         };
         walk.go_through(&Window { first: start, pages: window }, start..end)?;
-        tally.add((end - start).into());
+        progress.add(Step::Bake(Stage::Prove), (end - start).into());
         end = start;
     }
     if structure.is_some() {

@@ -36,7 +36,7 @@ impl SecondReading {
             if input.format() != MeshFormat::Obj {
                 return None;
             }
-            reading.add(&input.read_all(&Progress::default(), 0).ok()?)?;
+            reading.add(&input.read_all(&Progress::default()).ok()?)?;
         }
         Some(reading)
     }

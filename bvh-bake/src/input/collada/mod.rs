@@ -59,12 +59,11 @@ pub(super) fn read(
     found: &mut SceneFaces,
     memory: Allowance,
     progress: &Progress,
-    weight: u64,
 ) -> Result<(), Halt> {
     let memory = memory.less(input.bytes_in_memory());
     let own = if input.bytes_in_memory() > 0 { 0 } else { input.length() };
     memory.require(own)?;
-    let bytes = input.read_all(progress, weight)?;
+    let bytes = input.read_all(progress)?;
     let text = document::text(&bytes, memory.less(own))?;
     let document = &Document::parse(&text).map_err(Fault::from)?;
     let units = Units::of(document, input.up_axis())?;

@@ -1,70 +1,34 @@
 //! Gathers the faces of a file after all have been read: looks up their corners and cuts polygons into triangles.
 
 use super::Gatherer;
-use super::vertex_counter::Counter;
 use crate::error::{Fault, Halt};
 use crate::input::indexed::{FaceRun, IndexedFaces, LookedUp};
 use crate::input::names::Names;
 use crate::input::polygon::Cutter;
-use crate::progress::Tally;
 use crate::threads;
 
 /// The number of faces that one thread cuts at a time.
 const FACES_PER_TASK: usize = 1 << 12;
 
 impl Gatherer<'_> {
-    /// Adds faces that have been checked to the objects of `names`. `tally` counts the corners.
-    pub(super) fn add_faces(
-        &mut self,
-        faces: &IndexedFaces,
-        names: &Names,
-        tally: &Tally,
-    ) -> Result<(), Halt> {
+    /// Adds faces that have been checked to the objects of `names`.
+    pub(super) fn add_faces(&mut self, faces: &IndexedFaces, names: &Names) -> Result<(), Halt> {
         let first = self.names.len();
         for name in names.all() {
             self.object(name.clone())?;
         }
-        let mut counter = Counter::default();
-        let mut last: Option<(usize, u32)> = None;
         faces.each_window(|runs, corners| {
             let positions = faces.look_up(corners)?;
             let mut start = 0;
-            for runs in runs.chunk_by(|a, b| names.of(a) == names.of(b)) {
-                let of = names.of(&runs[0]);
-                if let Some((object, _)) = last.filter(|last| *last != of) {
-                    self.add_vertices(first + object, counter.end_run());
-                }
-                last = Some(of);
+            for runs in runs.chunk_by(|a, b| names.of(a).0 == names.of(b).0) {
+                let object = first + names.of(&runs[0]).0;
                 let triangles = Triangles::of(runs, start, &positions)?;
                 start += runs.iter().map(|run| run.faces as usize * run.corners as usize).sum::<usize>();
-                let counts = self.counts_vertices();
-                let mut gather = || {
-                    let corners_of = |number| triangles.corners(number).map(|place| positions.at(place));
-                    self.add_triangles(first + of.0, triangles.count(), corners_of)
-                };
-                let mut count = || {
-                    if counts {
-                        // Cutting may leave out corners that add nothing.
-                        (0..triangles.count()).for_each(|number| {
-                            let vertices = triangles.corners(number).map(|place| corners[place]);
-                            vertices.into_iter().for_each(|vertex| counter.add(vertex, faces.vertex_count()));
-                        });
-                    }
-                };
-                if triangles.count() < FACES_PER_TASK {
-                    gather()?;
-                    count();
-                } else {
-                    threads::join(gather, count).0?;
-                }
+                let corners_of = |number| triangles.corners(number).map(|place| positions.at(place));
+                self.add_triangles(object, triangles.count(), corners_of)?;
             }
-            tally.add(corners.len() as u64);
             Ok::<_, Halt>(())
-        })?;
-        if let Some((object, _)) = last {
-            self.add_vertices(first + object, counter.end_run());
-        }
-        Ok(())
+        })
     }
 }
 

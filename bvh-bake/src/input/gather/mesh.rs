@@ -2,7 +2,7 @@
 
 use super::Gatherer;
 use crate::error::Halt;
-use crate::input::mesh::{Instance, Mesh, Object};
+use crate::input::mesh::{Instance, Mesh};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -16,7 +16,6 @@ impl Gatherer<'_> {
             let number = self.object(object.name.clone())?;
             // Objects that are joined lose their names, even if one of them has no triangles.
             self.names[number].1 |= !self.split;
-            self.add_vertices(number, used_vertices(object));
         }
         let placed = mesh.instances.iter().map(|instance| Instance {
             object: instance.object.saturating_add(first as u32),
@@ -57,11 +56,4 @@ impl Gatherer<'_> {
         }
         runs
     }
-}
-
-/// Returns the number of vertices that triangles use.
-fn used_vertices(object: &Object) -> u64 {
-    let mut used = vec![false; object.positions.len()];
-    object.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
-    used.iter().filter(|&&used| used).count() as u64
 }

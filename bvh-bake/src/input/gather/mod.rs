@@ -8,7 +8,6 @@ mod input_order;
 mod mesh;
 mod scene;
 mod solids;
-mod vertex_counter;
 pub(crate) mod weld;
 
 pub(crate) use input_order::InputOrder;
@@ -18,13 +17,10 @@ use super::indexed::IndexedFaces;
 use super::input_file::Opener;
 use super::names::Names;
 use super::{Checksums, InputFile, MeshFormat, obj, pcd, ply, stl, xyz};
-use crate::error::BakeError;
-use crate::error::InputError;
-use crate::error::{Fault, Halt, Place, ReadError};
+use crate::error::{BakeError, Fault, Halt, InputError, Place, ReadError};
 use crate::input::mesh::{Instance, renumber, tell_apart};
 use crate::limits::MAX_TRIANGLES;
 use crate::options::Rounding;
-use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
 use crate::storage::{Piece, Spill};
 use crate::threads;
@@ -36,12 +32,6 @@ use solids::SolidsForBake;
 use std::ops::Range;
 use std::sync::OnceLock;
 use std::thread;
-
-/// The shares of OBJ text, of PLY bytes and of the bytes of points in the work of reading, in parts of [`WHOLE`]. The rest
-/// is spent on their corners.
-const OBJ_TEXT: u64 = 10;
-const PLY_BYTES: u64 = 10;
-const POINT_BYTES: u64 = 12;
 
 /// Bytes of memory per object, besides its name.
 const BYTES_PER_OBJECT: u64 = 64;
@@ -87,8 +77,6 @@ struct Body {
     /// The largest distance by which rounding on request moved a vertex.
     moved: Moved,
     count: u64,
-    /// The number of distinct vertices.
-    vertices: u64,
     /// Whether all triangles are points.
     is_cloud: bool,
 }
@@ -97,7 +85,7 @@ impl Body {
     fn new() -> Self {
         let (parts, open) = (Vec::new(), Vec::new());
         let (extent, moved) = (Extent::EMPTY, Moved::default());
-        Self { parts, open, parked: None, extent, moved, count: 0, vertices: 0, is_cloud: true }
+        Self { parts, open, parked: None, extent, moved, count: 0, is_cloud: true }
     }
 }
 
@@ -131,11 +119,6 @@ impl<'a> Gatherer<'a> {
 
     pub(crate) fn resources(&self) -> &'a Resources {
         self.resources
-    }
-
-    /// Returns whether the number of distinct vertices is needed.
-    fn counts_vertices(&self) -> bool {
-        self.runs.is_none()
     }
 
     /// Returns the number of triangles so far.
@@ -176,35 +159,21 @@ impl<'a> Gatherer<'a> {
     }
 
     fn read_stream(&mut self, opener: &Opener) -> Result<(), Halt> {
-        let open = |weight| move |is_first| opener.open(if is_first { weight } else { 0 });
+        let (input, warnings) = (opener.input, opener.input.warnings());
         let mut faces = IndexedFaces::new(self.resources);
-        let (names, left) = match opener.input.format() {
+        let mut names = Names::unnamed();
+        match input.format() {
             MeshFormat::Stl => {
-                let (reader, warnings) = (opener.open(WHOLE)?, opener.input.warnings());
-                return stl::read(reader, &mut SolidsForBake::new(self), warnings);
+                let mut solids = SolidsForBake { gatherer: self, object: 0 };
+                return stl::read(opener.open()?, &mut solids, warnings);
             }
-            MeshFormat::Ply => {
-                ply::read(open(PLY_BYTES), &mut faces, opener.input)?;
-                (Names::unnamed(), WHOLE - PLY_BYTES)
-            }
-            MeshFormat::Obj => {
-                let warnings = opener.input.warnings();
-                let names = obj::read(open(OBJ_TEXT), &mut faces, warnings, self.resources)?;
-                (names, WHOLE - OBJ_TEXT)
-            }
-            MeshFormat::Xyz => {
-                xyz::read(open(POINT_BYTES)(true)?, &mut faces, opener.input)?;
-                (Names::unnamed(), WHOLE - POINT_BYTES)
-            }
-            MeshFormat::Pcd => {
-                pcd::read(open(POINT_BYTES)(true)?, &mut faces, opener.input, self.resources)?;
-                (Names::unnamed(), WHOLE - POINT_BYTES)
-            }
+            MeshFormat::Ply => ply::read(|| opener.open(), &mut faces, input)?,
+            MeshFormat::Obj => names = obj::read(|| opener.open(), &mut faces, warnings, self.resources)?,
+            MeshFormat::Xyz => xyz::read(opener.open()?, &mut faces, input)?,
+            MeshFormat::Pcd => pcd::read(opener.open()?, &mut faces, input, self.resources)?,
             MeshFormat::Gltf | MeshFormat::Collada => unreachable!("these are no streams"),
-        };
-        let length = opener.input.length();
-        let tally = self.resources.progress.tally(Step::Read, left, length, faces.corner_count());
-        self.add_faces(&faces, &names, &tally)
+        }
+        self.add_faces(&faces, &names)
     }
 
     /// Names the objects from the number `first` on after their file, if objects stay separate and have no name. A glTF
@@ -255,12 +224,6 @@ impl<'a> Gatherer<'a> {
     /// Returns the number of the body of an object.
     fn body_of(&self, object: usize) -> usize {
         if self.split { object } else { 0 }
-    }
-
-    /// Adds to the number of distinct vertices of an object.
-    fn add_vertices(&mut self, object: usize, count: u64) {
-        let body = self.body_of(object);
-        self.bodies[body].vertices += count;
     }
 
     /// Adds triangles to an object. Their ids follow the present ones.
@@ -425,7 +388,6 @@ impl<'a> Gatherer<'a> {
                 stream,
                 moved: moved.joined(body.moved),
                 welded,
-                vertices: body.vertices,
                 is_cloud: body.is_cloud,
             });
         }

@@ -10,12 +10,9 @@ use crate::input::names::Names;
 use crate::input::warnings::counted;
 use crate::input::{COORDINATE, Checksums, InputFile, MeshFormat, collada};
 use crate::limits::coordinate_fits;
-use crate::progress::{Step, WHOLE};
 use crate::storage::resources::Resources;
 use std::collections::BTreeMap;
 
-/// The share of reading a file in the work on it, in parts of [`WHOLE`]. The rest is spent on its corners.
-const FILE_BYTES: u64 = 10;
 /// Bytes of memory per instance, besides its name.
 const BYTES_PER_INSTANCE: u64 = 320;
 /// Bytes of memory per object until its triangles are gathered, besides its name. Lists that grow have room for twice as many.
@@ -112,16 +109,15 @@ impl Gatherer<'_> {
         let mut found = SceneFaces::new(resources);
         let progress = &resources.progress;
         let checksums = if input.format() == MeshFormat::Gltf {
-            Checksums::of_gltf(input, &mut found, resources.document, progress, FILE_BYTES)?
+            Checksums::of_gltf(input, &mut found, resources.document, progress)?
         } else {
-            collada::read(input, &mut found, resources.document, progress, FILE_BYTES)?;
-            Checksums { file: input.checksum(progress, 0)?, mesh: None }
+            collada::read(input, &mut found, resources.document, progress)?;
+            Checksums { file: input.checksum(progress)?, mesh: None }
         };
         found.finish(input)?;
         let SceneFaces { faces, names, mut instances, .. } = found;
         let first = self.names.len();
-        let tally = progress.tally(Step::Read, WHOLE - FILE_BYTES, input.length(), faces.corner_count());
-        self.add_faces(&faces, &Names::of_objects(names), &tally)?;
+        self.add_faces(&faces, &Names::of_objects(names))?;
         instances.iter_mut().for_each(|instance| instance.object += first as u32);
         instances.retain(|instance| self.names[instance.object as usize].1);
         tell_apart(&mut instances);

@@ -35,9 +35,9 @@ const BYTES_PER_BLOCK: usize = 4 * BLOCK_BYTES;
 const BYTES_PER_NAME: u64 = 160;
 
 /// Reads a file into `faces` and returns the names of its objects. After a success, all corners are vertices that the
-/// format can hold. `open` opens the file at its beginning; its argument states whether this is the first time.
+/// format can hold. `open` opens the file at its beginning.
 pub(crate) fn read<R: Read>(
-    open: impl Fn(bool) -> Result<ByteReader<R>, Halt>,
+    open: impl Fn() -> Result<ByteReader<R>, Halt>,
     faces: &mut IndexedFaces,
     warnings: &Warnings,
     resources: &Resources,
@@ -45,9 +45,8 @@ pub(crate) fn read<R: Read>(
     let names = Names::default();
     let (triangles, lines, left_out, has_wrong_face) = (0, 0, <[LeftOut; _]>::default(), false);
     let mut reading = Reading { faces, names, resources, triangles, lines, left_out, has_wrong_face };
-    let mut reader = open(true)?;
+    let mut reader = open()?;
     reader.skip_mark();
-    let again = || open(false);
     let blocks_at_once = resources.reading_tasks(BYTES_PER_BLOCK);
     loop {
         let mut texts = Vec::new();
@@ -67,11 +66,11 @@ pub(crate) fn read<R: Read>(
         }
         for block in threads::map(texts, |text| Block::parse(&text)) {
             if !reading.add(block)? {
-                return Err(faults::find(again));
+                return Err(faults::find(open));
             }
         }
         if is_too_long {
-            return Err(faults::find(again));
+            return Err(faults::find(open));
         }
     }
     reader.finish(Ok(()))?;
@@ -80,10 +79,10 @@ pub(crate) fn read<R: Read>(
     let out_of_range = faces.first_out_of_range()?.map(|(place, _)| place);
     // A vertex that the format cannot hold is an error at the first face that uses it, which comes before errors below.
     if let Some((_, vertex)) = faces.first_misfit(out_of_range)? {
-        return Err(faults::misfit(again()?, vertex.into()));
+        return Err(faults::misfit(open()?, vertex.into()));
     }
     if has_wrong_face || out_of_range.is_some() {
-        return Err(faults::find(again));
+        return Err(faults::find(open));
     }
     let kinds = || Kind::ALL.into_iter().map(Kind::words).zip(&left_out);
     kinds().for_each(|(words, left_out)| left_out.tell(warnings, words));

@@ -45,8 +45,6 @@ pub(super) trait Solids {
         count: usize,
         corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
     ) -> Result<(), Halt>;
-    /// Ends the solid.
-    fn end(&mut self) -> Result<(), Halt>;
 }
 
 /// Reads a file into a mesh in which equal vertices are joined.
@@ -167,7 +165,7 @@ fn read_binary<R: Read>(
         }
         warnings.add(Place::Byte(end), leftover.judge(Place::Byte(end))?);
     }
-    solids.end()
+    Ok(())
 }
 
 /// Returns the corners of a binary triangle.
@@ -222,7 +220,6 @@ fn read_ascii<R: Read>(
             }
         }
         solids.triangles(batch.len(), |place| batch[place])?;
-        solids.end()?;
     }
     Ok(())
 }
@@ -309,6 +306,7 @@ impl Solids for Joined {
         let mut object = Object { name, ..Object::default() };
         // The file is long enough to hold that many.
         object.triangles.reserve_exact(expected);
+        object.triangle_ids.reserve_exact(expected);
         self.mesh.objects.push(object);
         // A closed surface has half as many vertices as triangles.
         self.numbers = HashMap::with_capacity(expected / 2);
@@ -328,12 +326,7 @@ impl Solids for Joined {
             }
             object.triangles.push(triangle);
         }
-        Ok(())
-    }
-
-    fn end(&mut self) -> Result<(), Halt> {
-        let object = self.mesh.objects.last_mut().expect("the solid has begun");
-        object.triangle_ids = next_ids(&mut self.next_id, object.triangles.len())?;
+        object.triangle_ids.append(&mut next_ids(&mut self.next_id, count)?);
         Ok(())
     }
 }
