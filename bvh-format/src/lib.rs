@@ -72,7 +72,6 @@ pub mod ordered;
 pub mod page;
 pub mod profile;
 pub mod quantize;
-pub mod realign;
 pub mod rewrite_rounding;
 mod rule;
 pub mod slabs;

@@ -1,7 +1,7 @@
 //! Chooses the profile and the triangle encoding of an object, where the options leave them open: the encoding by the size of
 //! the object, and the profile by what the caller said about the encoding.
 //!
-//! `spec/rationale.md` has the measurements. They agree on meshes of all kinds, so that no mesh has to be tried.
+//! `bvh-query/lab/notebook/bytes.md` has the measurements. They agree on meshes of all kinds, so that no mesh has to be tried.
 
 use crate::options::Options;
 use bvh_format::leaf::TriangleEncoding;

@@ -1,7 +1,7 @@
 //! Re-aligns the k-DOPs of B to the directions of A under a pose.
 //!
 //! Along a direction `d` of A, seen from B as `d' = R^T d`, the ends of a node of B follow from three of
-//! its slabs: see `bvh_format::realign`.
+//! its slabs: see `traverse/forms`.
 //!
 //! Rounding: with u = 2^-24, all ends at most M in magnitude, three rounded coefficients, three
 //! products and three sums, the computed end is within 8u (M sum |c_j| + |t|) of the exact one, where
@@ -13,9 +13,9 @@
 
 use crate::isa::{Isa, Lanes, Part, Task};
 use crate::numerics::{END_UNDERFLOW, U};
+use crate::traverse::forms::{cone, magnitudes, rows_by_cone};
 use crate::traverse::placement::Placement;
 use bvh_format::kdop::{DirectionSet, FACTORS};
-use bvh_format::realign::{cone, magnitudes, rows_by_cone};
 use bvh_format::slabs::{Group, row};
 
 /// All directions of A for one pose: the three terms of B's upper ends along them, and what to add. The lower end

@@ -16,12 +16,12 @@ use crate::file::place::LeafPacket;
 use crate::numerics::SLACK;
 use crate::traverse::align::form_error;
 use crate::traverse::cached_node::{CachedNode, ChildRef};
+use crate::traverse::forms::{Form, upper_form};
 use crate::traverse::node_cache::NodeCache;
 use crate::traverse::pending::Entry;
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
-use bvh_format::realign::{Form, upper_form};
 use bvh_format::vec3::dot;
 
 type Point = [f64; 3];

@@ -4,6 +4,7 @@ pub(crate) mod align;
 pub(crate) mod budget;
 pub(crate) mod cached_node;
 pub(crate) mod decode;
+pub(crate) mod forms;
 pub(crate) mod large_leaf;
 pub(crate) mod leaf_pairs;
 pub(crate) mod line_filter;

@@ -3,9 +3,9 @@
 use crate::isa::{Isa, Lanes};
 use crate::numerics::F32_SLACK;
 use crate::traverse::align::{Alignment, Prepare, form_error};
+use crate::traverse::forms::{Form, upper_form};
 use crate::traverse::placement::{ObjectPair, Placement};
 use bvh_format::kdop::{DirectionSet, FACTORS};
-use bvh_format::realign::{Form, upper_form};
 use bvh_format::slabs::{Group, NodeSlabs, row};
 
 /// What the bound of a pair means.

@@ -8,16 +8,16 @@
 //! of the coordinates of `d`. The method is that of Zachmann (VRAIS 1998), who uses the three faces at the extreme
 //! vertex.
 
-use crate::kdop::DirectionSet;
-use crate::slabs::row;
+use bvh_format::kdop::DirectionSet;
+use bvh_format::slabs::row;
 
 /// A linear form over the slab ends of a node: the rows of three ends, and their coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Form {
+pub(crate) struct Form {
     /// Rows of a decoded group: 0 to 15 for lower ends, 16 to 31 for upper ends.
-    pub rows: [u8; 3],
+    pub(crate) rows: [u8; 3],
     /// The factors of the ends.
-    pub coefficients: [f32; 3],
+    pub(crate) coefficients: [f32; 3],
 }
 
 impl Form {
@@ -30,7 +30,7 @@ impl Form {
 
     /// Returns the form of the lower end along the same direction, which takes the other end of each slab.
     #[inline(always)]
-    pub fn mirrored(self) -> Self {
+    pub(crate) fn mirrored(self) -> Self {
         Self { rows: self.rows.map(|row| row ^ 16), ..self }
     }
 }
@@ -49,7 +49,7 @@ const CUBE_DIAGONALS: [(u8, bool); 8] =
 /// in `ORDERS`; bits 3 to 5 are set for negative coordinates. Comparisons take the sign bits of differences, so that
 /// compilers handle many directions in vector registers.
 #[inline(always)]
-pub fn cone([x, y, z]: [f64; 3]) -> u64 {
+pub(crate) fn cone([x, y, z]: [f64; 3]) -> u64 {
     let negative = |value: f64| value.to_bits() >> 63;
     let less = |a: f64, b: f64| negative(a.abs() - b.abs());
     let order = less(x, y) | less(y, z) << 1 | less(x, z) << 2;
@@ -70,7 +70,7 @@ fn rows_of_cone(cone: u64, set: DirectionSet) -> u32 {
 
 /// Returns the magnitudes of the three coefficients along `d`.
 #[inline(always)]
-pub fn magnitudes(d: [f64; 3], set: DirectionSet) -> [f64; 3] {
+pub(crate) fn magnitudes(d: [f64; 3], set: DirectionSet) -> [f64; 3] {
     let [x, y, z] = [d[0].abs(), d[1].abs(), d[2].abs()];
     let (less, more) = if x < y { (x, y) } else { (y, x) };
     let largest = if more < z { z } else { more };
@@ -91,13 +91,13 @@ fn signed(magnitude: f32, rows: u32, j: usize) -> f32 {
 
 /// Returns the form of the upper end along `d` over the directions of a set.
 #[inline(always)]
-pub fn upper_form(d: [f64; 3], set: DirectionSet) -> Form {
+pub(crate) fn upper_form(d: [f64; 3], set: DirectionSet) -> Form {
     let (rows, magnitudes) = (rows_of_cone(cone(d), set), magnitudes(d, set));
     Form::new(rows, [0, 1, 2].map(|j| signed(magnitudes[j] as f32, rows, j)))
 }
 
 /// Returns the words of rows of all 64 cones: for each, the three ends that make up the upper end, one row per byte.
-pub const fn rows_by_cone(set: DirectionSet) -> [u32; 64] {
+pub(crate) const fn rows_by_cone(set: DirectionSet) -> [u32; 64] {
     let mut rows = [0; 64];
     let mut cone = 0;
     while cone < 64 {
@@ -135,7 +135,7 @@ const fn is_set(bits: u8, bit: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdop::DIRECTIONS;
+    use bvh_format::kdop::DIRECTIONS;
     use cbvh_testkit::Random;
 
     /// How far a form says that the k-DOP of a unit ball reaches: each end is the length of its direction.
