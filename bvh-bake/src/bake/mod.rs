@@ -5,9 +5,9 @@ mod object;
 pub(crate) mod provenance;
 pub(crate) mod report;
 
-use crate::bake::provenance::value_of;
 use crate::check::open_edges::{count_all, count_object};
 use crate::check::prove::prove;
+use crate::check::provenance::value_of;
 use crate::error::{BakeError, LimitError, excerpt};
 use crate::input::gather::Gatherer;
 use crate::input::gather::weld::check_length;

@@ -1,14 +1,14 @@
 //! Writes and compares the provenance text of a file: the origin of its mesh, and what a repeated bake depends on.
 
 use crate::bake::report::FileSummary;
+use crate::check::provenance::{text_of, value_of};
 use crate::input::{self, Checksums};
 use crate::options::Options;
 use crate::progress::Progress;
 use crate::storage::output::OutputSource;
 use bvh_format::Layout;
 use bvh_format::checksum::checksum;
-use bvh_format::header::{MAJOR, MINOR, SectionKind};
-use bvh_format::source::Source;
+use bvh_format::header::{MAJOR, MINOR};
 use bvh_format::validate::check_sections;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -93,20 +93,4 @@ pub(super) fn up_to_date(output: &Path, provenance: &Provenance, progress: &Prog
     let instances = layout.read_instances(&source).ok()?.len() as u64;
     let topology = layout.read_topology(&source).ok()?;
     Some(FileSummary::new(&layout, length, instances, &topology))
-}
-
-/// The most bytes of a provenance text that are read. The texts of this baker are short.
-const MAX_TEXT: usize = 1 << 20;
-
-/// Returns the provenance text of a file; `None` if it has none, or one that is no text.
-pub(crate) fn text_of<S: Source + ?Sized>(layout: &Layout, source: &S) -> Result<Option<String>, S::Error> {
-    let section = layout.sections.iter().find(|section| section.kind == SectionKind::Provenance);
-    let Some(section) = section else { return Ok(None) };
-    let range = section.range.start..section.range.end.min(section.range.start + MAX_TEXT);
-    Ok(String::from_utf8(source.read(range)?.into_owned()).ok())
-}
-
-/// Returns the value of a key in such a text.
-pub(crate) fn value_of<'a>(text: &'a str, key: &str) -> Option<&'a str> {
-    text.lines().filter_map(|line| line.split_once('=')).find(|(k, _)| *k == key).map(|(_, value)| value)
 }

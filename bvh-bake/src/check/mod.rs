@@ -2,4 +2,5 @@
 
 pub(crate) mod open_edges;
 pub(crate) mod prove;
+pub(crate) mod provenance;
 pub(crate) mod verify;

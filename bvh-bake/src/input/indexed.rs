@@ -29,7 +29,7 @@ pub(crate) struct FaceRun {
     pub(crate) corners: u32,
     /// The number of the object that the faces belong to.
     pub(crate) object: u32,
-    /// The number of the group. Vertices are counted anew for each group.
+    /// The number of the group. A mesh in memory numbers its vertices anew for each group.
     pub(crate) group: u32,
     pub(crate) faces: u32,
 }
@@ -105,7 +105,7 @@ impl IndexedFaces {
         Ok(())
     }
 
-    /// Adds faces to an object, each with the stated number of corners. Vertices are counted anew for each group.
+    /// Adds faces to a group of an object, each with the stated number of corners.
     pub(crate) fn add_run(
         &mut self,
         corners_per_face: u32,

@@ -5,7 +5,7 @@
 
 use super::input::{Input, InputCorners};
 use super::{VerifyError, source_of, tolerance};
-use crate::bake::provenance::{text_of, value_of};
+use crate::check::provenance::{text_of, value_of};
 use crate::input::gather::weld::{Unwelded, Welded, wide};
 use crate::input::mesh::Instance;
 use crate::options::Rounding;
