@@ -11,8 +11,8 @@ mod shapes;
 mod suite;
 
 use super::ask::Asked;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use crate::common::{bake, mesh, options, queriers, stored};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
