@@ -11,7 +11,6 @@ pub mod damage;
 pub mod depth;
 pub mod exact;
 pub mod forge;
-pub mod hard_cases;
 pub mod here;
 pub mod loosen;
 pub mod random;

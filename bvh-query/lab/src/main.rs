@@ -12,8 +12,6 @@ mod common;
 #[allow(dead_code, reason = "the search asks about poses, and the tests walk to the boundary")]
 mod exact {
     pub(crate) mod ask;
-    pub(crate) mod tally;
-    pub(crate) mod truth;
 }
 mod output;
 mod search;

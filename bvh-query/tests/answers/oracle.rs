@@ -1,8 +1,9 @@
 //! Checks every answer against brute force over all pairs of triangles with exact predicates, for all profiles,
 //! triangle encodings and backends.
 
+use crate::common::expected::Expected;
 use crate::common::shapes::{comb, cube, dirty, moved, plate, soup, sphere, terrain, torus};
-use crate::common::truth::Truth;
+use crate::common::truth::Surface;
 use crate::common::{
     Random, Triangle, bake, baked, fcl_pair, mesh, options, queriers, random_pose, rotation, shared_mesh,
     stored, translation,
@@ -30,14 +31,14 @@ const LOSSLESS: [TriangleEncoding; 2] = [TriangleEncoding::F32, TriangleEncoding
 /// all must be equal, except that different triangles may be named when the meshes touch.
 fn check(a: &[Bvh], b: &[Bvh], poses: &[Pose]) {
     let mut queriers = queriers();
-    let (stored_a, stored_b) = (stored(&a[0]), stored(&b[0]));
+    let [of_a, of_b] = [&a[0], &b[0]].map(|file| Surface::new(stored(file)));
     for pose in poses {
-        let truth = Truth::new(&stored_a, &stored_b, pose);
+        let expected = Expected::new(&of_a, &of_b, pose);
         let mut apart: Option<Distance> = None;
         for i in 0..a.len().max(b.len()) {
             for other in [i, 7 * i + 3] {
                 let (a, b) = (&a[i % a.len()], &b[other % b.len()]);
-                let answer = truth.check(a, b, pose, &mut queriers);
+                let answer = expected.check(a, b, pose, &mut queriers);
                 if answer.distance > 0.0 {
                     assert_eq!(*apart.get_or_insert(answer), answer, "file {i} against {other}");
                 }

@@ -4,10 +4,9 @@
 //! differ from its label by 1e-8 of the size. A sample of the answers is checked to 1e-12 by brute force on the
 //! stored triangles.
 
-use crate::common::truth::Truth;
-use crate::common::{
-    Stored, bake, fcl_pair, options, queriers, shared, shared_mesh, stated, stored, testdata,
-};
+use crate::common::expected::Expected;
+use crate::common::truth::Surface;
+use crate::common::{bake, fcl_pair, options, queriers, shared, shared_mesh, stated, stored, testdata};
 use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
@@ -77,16 +76,17 @@ fn check_preset(preset: &str, label: f64, what: &str) {
 }
 
 /// Checks an answer by brute force on the stored triangles.
-fn check_by_brute_force(stored: &[Vec<Stored>; 2], a: &Bvh, b: &Bvh, pose: &Pose, querier: &mut Querier) {
+fn check_by_brute_force(surfaces: &[Surface; 2], a: &Bvh, b: &Bvh, pose: &Pose, querier: &mut Querier) {
     let answer = querier.distance(a, b, pose).unwrap();
-    Truth::within(&stored[0], &stored[1], pose, 1.001 * answer.distance).check_distance(&answer);
+    let [of_a, of_b] = surfaces;
+    Expected::within(of_a, of_b, pose, 1.001 * answer.distance).check_distance(&answer);
 }
 
 fn check_pair(name: &str, mesh_a: &str, mesh_b: &str) {
     let (a, b) = (baked(mesh_a), baked(mesh_b));
-    let stored = [stored(a), stored(b)];
+    let surfaces = [a, b].map(|file| Surface::new(stored(file)));
     let mut queriers = queriers();
-    let (small, fastest) = (stored[0].len() < 100_000, queriers.len() - 1);
+    let (small, fastest) = (surfaces[0].stored.len() < 100_000, queriers.len() - 1);
     for (preset, sample) in PRESETS {
         let text = std::fs::read_to_string(shared(&format!("poses/{name}_{preset}.txt"))).unwrap();
         // One file of a1hand has 99 poses.
@@ -99,7 +99,7 @@ fn check_pair(name: &str, mesh_a: &str, mesh_b: &str) {
             let (pose, label) = check_line(a, b, line, asked, &what);
             check_preset(preset, label, &what);
             if number < sample {
-                check_by_brute_force(&stored, a, b, &pose, &mut queriers[0]);
+                check_by_brute_force(&surfaces, a, b, &pose, &mut queriers[0]);
             }
         }
     }
@@ -110,7 +110,7 @@ fn check_pair(name: &str, mesh_a: &str, mesh_b: &str) {
 fn labelled_poses_of_a_small_pair() {
     let meshes = fcl_pair();
     let [a, b] = [0, 1].map(|k| bake(&meshes[k], &Options::default()));
-    let stored = [stored(&a), stored(&b)];
+    let surfaces = [&a, &b].map(|file| Surface::new(stored(file)));
     let compressed = options(Profile::Dop6U8, TriangleEncoding::Packed);
     let small = [0, 1].map(|k| bake(&meshes[k], &compressed));
     let mut queriers = queriers();
@@ -124,7 +124,7 @@ fn labelled_poses_of_a_small_pair() {
             Some((_, sample)) => {
                 check_preset(preset, label, &what);
                 if *number < *sample {
-                    check_by_brute_force(&stored, &a, &b, &pose, &mut queriers[0]);
+                    check_by_brute_force(&surfaces, &a, &b, &pose, &mut queriers[0]);
                 }
             }
             None => {
@@ -225,8 +225,8 @@ fn poses_on_which_libraries_disagree() {
             // The stated penetration is 1e-9 of the size. Six decimals lose more when they become `f32`, so the
             // meshes are apart.
             let answer = queriers[0].distance(&a[0], &b[0], &pose).unwrap();
-            Truth::within(&stored(&a[0]), &stored(&b[0]), &pose, 2.0 * answer.distance)
-                .check_distance(&answer);
+            let [of_a, of_b] = [&a[0], &b[0]].map(|file| Surface::new(stored(file)));
+            Expected::within(&of_a, &of_b, &pose, 2.0 * answer.distance).check_distance(&answer);
             assert!(answer.distance < 2e-9 * size, "{answer:?}");
             label = answer.distance;
         }

@@ -1,8 +1,9 @@
 //! Checks that turning slabs change no answer and save tests: the same meshes with and without them, against brute force,
 //! on all backends.
 
+use crate::common::expected::Expected;
 use crate::common::shapes::{dirty, moved, plate, sphere, torus};
-use crate::common::truth::Truth;
+use crate::common::truth::Surface;
 use crate::common::{Random, Triangle, mesh, options, queriers, random_pose, stored};
 use bvh_bake::{prove_bounds, to_bytes};
 use bvh_format::Layout;
@@ -55,7 +56,7 @@ fn answers_are_those_without_and_those_of_brute_force() {
     let files: Vec<_> = meshes.iter().map(|triangles| with_and_without(triangles)).collect();
     let mut queriers = queriers();
     for (a, b) in [(0, 0), (0, 1), (1, 2), (2, 3), (3, 0), (4, 1), (1, 4)] {
-        let (stored_a, stored_b) = (stored(&files[a][0]), stored(&files[b][0]));
+        let [of_a, of_b] = [a, b].map(|side| Surface::new(stored(&files[side][0])));
         for gap in [0.0, 1e-6, 1e-3, 0.05, 0.3] {
             let mut pose = apart(random, [&files[a][0], &files[b][0]], &mut queriers[0], gap);
             if a == 4 || b == 4 {
@@ -67,11 +68,11 @@ fn answers_are_those_without_and_those_of_brute_force() {
                 let near = [0, 1, 2].map(|i| back[i] + 2.2 * random.point()[i]);
                 pose = Pose::new(*r, near).unwrap();
             }
-            let truth = Truth::new(&stored_a, &stored_b, &pose);
+            let expected = Expected::new(&of_a, &of_b, &pose);
             let mut answers = Vec::new();
             for with_a in 0..2 {
                 for with_b in 0..2 {
-                    answers.push(truth.check(&files[a][with_a], &files[b][with_b], &pose, &mut queriers));
+                    answers.push(expected.check(&files[a][with_a], &files[b][with_b], &pose, &mut queriers));
                 }
             }
             assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");

@@ -3,8 +3,10 @@
 #![allow(dead_code, reason = "each test program uses a part of it")]
 
 pub(crate) mod asked;
+pub(crate) mod expected;
 pub(crate) mod nearest;
 pub(crate) mod shapes;
+pub(crate) mod tally;
 pub(crate) mod truth;
 
 use bvh_bake::mesh::Mesh;

@@ -86,74 +86,45 @@ pub(crate) fn point_triangle(p: Point, triangle: &Triangle) -> f64 {
     distance(&[p; 3], triangle)
 }
 
-#[derive(Clone, Copy)]
-struct Bounds {
-    lo: Point,
-    hi: Point,
-}
-
-impl Bounds {
-    fn of<'a>(triangles: impl Iterator<Item = &'a Triangle>) -> Self {
-        let empty = Self { lo: [f64::MAX; 3], hi: [f64::MIN; 3] };
-        triangles.flatten().fold(empty, |bounds, corner| Self {
-            lo: [0, 1, 2].map(|axis| bounds.lo[axis].min(corner[axis])),
-            hi: [0, 1, 2].map(|axis| bounds.hi[axis].max(corner[axis])),
-        })
-    }
-
-    /// Returns a lower bound of the distance between anything in the two boxes, rounding included.
-    fn gap(&self, other: &Self) -> f64 {
-        let gap = [0, 1, 2].map(|k| (self.lo[k] - other.hi[k]).max(other.lo[k] - self.hi[k]).max(0.0));
-        let largest = gap.into_iter().fold(0.0, f64::max);
-        if largest == 0.0 {
-            0.0
-        } else {
-            largest * gap.map(|g| (g / largest).powi(2)).iter().sum::<f64>().sqrt() * (1.0 - 1e-12)
-        }
-    }
-}
-
 /// Triangles in blocks of neighbours, each block with its box.
-pub(crate) struct Blocks<'a> {
-    triangles: &'a [Triangle],
-    blocks: Vec<(Bounds, Vec<(usize, Bounds)>)>,
-}
+pub(crate) struct Blocks(Vec<(Boxed, Vec<(usize, Boxed)>)>);
 
-impl<'a> Blocks<'a> {
-    pub(crate) fn new(triangles: &'a [Triangle]) -> Self {
+impl Blocks {
+    pub(crate) fn new(triangles: &[Boxed]) -> Self {
         let most = ((triangles.len() as f64).sqrt() as usize / 4).max(4);
         let mut blocks = Vec::new();
-        let all = triangles.iter().enumerate().map(|(i, t)| (i, Bounds::of(std::iter::once(t)))).collect();
-        let mut open: Vec<Vec<(usize, Bounds)>> = vec![all];
+        let mut open: Vec<Vec<(usize, Boxed)>> = vec![triangles.iter().copied().enumerate().collect()];
         while let Some(mut block) = open.pop() {
-            let bounds = Bounds::of(block.iter().map(|&(i, _)| &triangles[i]));
+            let Some(around) = Boxed::around(block.iter().map(|(_, boxed)| boxed)) else { continue };
             if block.len() <= most {
-                blocks.push((bounds, block));
+                blocks.push((around, block));
                 continue;
             }
-            let sides = [0, 1, 2].map(|k| bounds.hi[k] - bounds.lo[k]);
-            let axis = (0..3).max_by(|&i, &j| sides[i].total_cmp(&sides[j])).unwrap();
-            let middle = block.len() / 2;
-            let centre = |bounds: &Bounds| bounds.lo[axis] / 2.0 + bounds.hi[axis] / 2.0;
-            block.select_nth_unstable_by(middle, |p, q| centre(&p.1).total_cmp(&centre(&q.1)));
+            let (axis, middle) = (around.longest_axis(), block.len() / 2);
+            block.select_nth_unstable_by(middle, |p, q| p.1.middle(axis).total_cmp(&q.1.middle(axis)));
             open.push(block.split_off(middle));
             open.push(block);
         }
-        Self { triangles, blocks }
+        Self(blocks)
     }
 
-    /// Calls `visit` with the numbers of each pair whose boxes are at most `reach` apart. `visit` returns a new
-    /// reach, which counts if it is lower.
-    pub(crate) fn pairs(&self, other: &Self, mut reach: f64, mut visit: impl FnMut(usize, usize) -> f64) {
-        for (bounds_a, block_a) in &self.blocks {
-            for (bounds_b, block_b) in &other.blocks {
-                if bounds_a.gap(bounds_b) > reach {
+    /// Calls `visit` with each pair whose boxes are at most `reach` apart. `visit` returns a new reach, which counts if it
+    /// is lower.
+    fn pairs(
+        &self,
+        other: &Self,
+        mut reach: f64,
+        mut visit: impl FnMut(&(usize, Boxed), &(usize, Boxed)) -> f64,
+    ) {
+        for (around_a, block_a) in &self.0 {
+            for (around_b, block_b) in &other.0 {
+                if around_a.gap(around_b) > reach {
                     continue;
                 }
-                for (a, box_a) in block_a {
-                    for (b, box_b) in block_b {
-                        if box_a.gap(box_b) <= reach {
-                            reach = reach.min(visit(*a, *b));
+                for a in block_a {
+                    for b in block_b {
+                        if a.1.gap(&b.1) <= reach {
+                            reach = reach.min(visit(a, b));
                         }
                     }
                 }
@@ -162,12 +133,11 @@ impl<'a> Blocks<'a> {
     }
 
     /// Returns the pairs that meet, in ascending order.
-    pub(crate) fn contacts(&self, other: &Self) -> Vec<(usize, usize)> {
+    pub(crate) fn contacts(&self, other: &Self, decided: &mut Decided) -> Vec<(usize, usize)> {
         let mut contacts = Vec::new();
-        self.pairs(other, 0.0, |a, b| {
-            let [of_a, of_b] = [self.triangles[a], other.triangles[b]].map(Boxed::new);
-            if intersect(&of_a, &of_b, &mut Decided::default()) {
-                contacts.push((a, b));
+        self.pairs(other, 0.0, |(i, a), (j, b)| {
+            if intersect(a, b, decided) {
+                contacts.push((*i, *j));
             }
             0.0
         });
@@ -179,11 +149,11 @@ impl<'a> Blocks<'a> {
     /// least one by at most `slack`.
     pub(crate) fn nearest(&self, other: &Self, reach: f64, slack: f64) -> Vec<(f64, usize, usize)> {
         let (mut found, mut best) = (Vec::new(), reach);
-        self.pairs(other, reach + slack, |a, b| {
-            let distance = distance(&self.triangles[a], &other.triangles[b]);
+        self.pairs(other, reach + slack, |(i, a), (j, b)| {
+            let distance = distance(&a.corners, &b.corners);
             best = best.min(distance);
             if distance <= best + slack {
-                found.push((distance, a, b));
+                found.push((distance, *i, *j));
             }
             best + slack
         });

@@ -1,127 +1,133 @@
-//! Computes the right answers for two meshes in a pose by brute force, and compares the library's answers with them.
+//! Computes the right answers for two meshes in a pose, from the oracles over all pairs of triangles.
 
-use super::nearest::{Blocks, point_triangle};
-use super::{Stored, Triangle, corners, placed, size};
-use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
-use cbvh_testkit::exact::Length;
+use super::nearest::Blocks;
+use super::tally::Tally;
+use super::{Stored, Triangle, placed, size};
+use bvh_query::{Contact, Distance, Pose};
+use cbvh_testkit::exact::{Boxed, Length, certainly_farther, intersect};
 
-/// The largest error of a distance, as a fraction of the size.
-const TOLERANCE: f64 = 1e-12;
-
-pub(crate) struct Truth {
-    a: Vec<Stored>,
-    b: Vec<Stored>,
-    corners_a: Vec<Triangle>,
-    corners_b: Vec<Triangle>,
-    contacts: Vec<Contact>,
-    /// The pairs that may be the nearest.
-    nearest: Vec<(f64, usize, usize)>,
-    tolerance: f64,
+/// A mesh as a file stores it.
+pub(crate) struct Surface {
+    pub(crate) stored: Vec<Stored>,
+    pub(crate) corners: Vec<Triangle>,
 }
 
-impl Truth {
-    pub(crate) fn new(a: &[Stored], b: &[Stored], pose: &Pose) -> Self {
-        Self::within(a, b, pose, f64::INFINITY)
+impl Surface {
+    pub(crate) fn new(stored: Vec<Stored>) -> Self {
+        let corners = stored.iter().map(|stored| stored.corners).collect();
+        Self { stored, corners }
     }
 
-    /// Computes the answers as `new` does, but looks for nearest pairs only up to `reach`. This is for large meshes:
-    /// it shows that nothing is nearer than their answer.
-    pub(crate) fn within(a: &[Stored], b: &[Stored], pose: &Pose, reach: f64) -> Self {
-        let (corners_a, corners_b) = (corners(a), placed(&corners(b), pose));
-        let (blocks_a, blocks_b) = (Blocks::new(&corners_a), Blocks::new(&corners_b));
-        let contact = |(i, j): (usize, usize)| Contact {
-            object_a: a[i].object,
-            triangle_a: a[i].id,
-            object_b: b[j].object,
-            triangle_b: b[j].id,
-        };
-        let contacts: Vec<_> = blocks_a.contacts(&blocks_b).into_iter().map(contact).collect();
-        let size = size(&corners_a, &corners_b);
-        let mut nearest = Vec::new();
-        if contacts.is_empty() {
-            nearest = blocks_a.nearest(&blocks_b, reach, 1e-9 * size);
+    /// Returns the place in the list of the triangle that an answer names.
+    fn find(&self, object: u32, id: u32) -> Option<usize> {
+        self.stored.binary_search_by_key(&(object, id), |stored| (stored.object, stored.id)).ok()
+    }
+}
+
+/// Two meshes, placed by a pose.
+pub(crate) struct Truth<'a> {
+    a: &'a Surface,
+    b: &'a Surface,
+    boxed_a: Vec<Boxed>,
+    boxed_b: Vec<Boxed>,
+    /// The diagonal of the box around both.
+    pub(crate) size: f64,
+}
+
+impl<'a> Truth<'a> {
+    pub(crate) fn new(a: &'a Surface, b: &'a Surface, pose: &Pose) -> Self {
+        let corners_b = placed(&b.corners, pose);
+        let boxed = |corners: &[Triangle]| corners.iter().map(|&t| Boxed::new(t)).collect();
+        let size = size(&a.corners, &corners_b);
+        Self { a, b, boxed_a: boxed(&a.corners), boxed_b: boxed(&corners_b), size }
+    }
+
+    fn blocks(&self) -> [Blocks; 2] {
+        [&self.boxed_a, &self.boxed_b].map(|boxed| Blocks::new(boxed))
+    }
+
+    /// Returns whether the meshes meet. `hint` is a pair to try first, and is set to the pair that meets.
+    pub(crate) fn collide(&self, hint: &mut (usize, usize), tally: &mut Tally) -> bool {
+        if intersect(&self.boxed_a[hint.0], &self.boxed_b[hint.1], &mut tally.decided) {
+            return true;
         }
-        let tolerance = TOLERANCE * size;
-        Self { a: a.to_vec(), b: b.to_vec(), corners_a, corners_b, contacts, nearest, tolerance }
-    }
-
-    /// The contacts, in the order of answers.
-    pub(crate) fn contacts(&self) -> &[Contact] {
-        &self.contacts
-    }
-
-    /// Asks every query on all backends. Returns the distance, on which they must agree.
-    pub(crate) fn check(&self, a: &Bvh, b: &Bvh, pose: &Pose, queriers: &mut [Querier]) -> Distance {
-        let first = queriers[0].distance(a, b, pose).unwrap();
-        self.check_distance(&first);
-        for querier in queriers {
-            let touching = !self.contacts.is_empty();
-            assert_eq!(querier.collide(a, b, pose).unwrap(), touching, "{}", querier.backend());
-            assert_eq!(querier.contacts(a, b, pose).unwrap(), self.contacts, "{}", querier.backend());
-            let answer = querier.distance(a, b, pose).unwrap();
-            assert_eq!(answer, first, "{}", querier.backend());
-            let fresh = Querier::with_backend(querier.backend()).distance(a, b, pose).unwrap();
-            assert_eq!(answer, fresh, "{}", querier.backend());
-            let d = answer.distance;
-            let Distance { lower, upper, .. } = answer;
-            let ends = [d, lower, upper].into_iter().flat_map(|x| [x.next_down(), x, x.next_up()]);
-            let far = [0.0, f64::MAX, f64::MIN_POSITIVE, d * 3.0, d * 0.5];
-            let near = [upper * (1.0 + 1e-9), lower * (1.0 - 1e-9)];
-            for limit in ends.chain(far).chain(near) {
-                // For limits between `lower` and `upper`, integers decide; the tests with an exact oracle cover
-                // those.
-                if limit < 0.0 || lower <= limit && limit < upper {
-                    continue;
+        for (i, a) in self.boxed_a.iter().enumerate() {
+            for (j, b) in self.boxed_b.iter().enumerate() {
+                if intersect(a, b, &mut tally.decided) {
+                    *hint = (i, j);
+                    return true;
                 }
-                let within = querier.within(a, b, pose, limit).unwrap();
-                assert_eq!(within, limit >= upper, "{} within {limit}, {answer:?}", querier.backend());
-            }
-            for (rel_err, abs_err) in [(0.2, 0.0), (0.0, 0.1 * d), (0.05, 0.01 * d)] {
-                let options = DistanceOptions::new().rel_err(rel_err).abs_err(abs_err);
-                let rough = querier.distance_with(a, b, pose, &options).unwrap();
-                let allowed = d * (1.0 + rel_err) + abs_err + self.tolerance;
-                assert!((d..=allowed).contains(&rough.distance), "{rough:?}, least {d}, {options:?}");
-                assert!(rough.lower <= first.upper, "{rough:?}, least {d}, {options:?}");
-                let proved = rough.lower * (1.0 + rel_err) + abs_err + self.tolerance;
-                assert!(rough.distance <= proved, "{rough:?}, {options:?}");
             }
         }
-        first
+        false
     }
 
-    pub(crate) fn check_distance(&self, answer: &Distance) {
-        let find = |all: &[Stored], object: u32, id: u32| {
-            let place = all.binary_search_by_key(&(object, id), |stored| (stored.object, stored.id));
-            place.unwrap_or_else(|_| panic!("no triangle {id} in object {object}"))
+    fn pair(&self, i: usize, j: usize) -> Contact {
+        let (a, b) = (&self.a.stored[i], &self.b.stored[j]);
+        Contact { object_a: a.object, triangle_a: a.id, object_b: b.object, triangle_b: b.id }
+    }
+
+    /// Returns all pairs in contact, in ascending order.
+    pub(crate) fn contacts(&self, tally: &mut Tally) -> Vec<Contact> {
+        let [blocks_a, blocks_b] = self.blocks();
+        let pairs = blocks_a.contacts(&blocks_b, &mut tally.decided);
+        tally.pairs += (self.boxed_a.len() * self.boxed_b.len()) as u64;
+        tally.contacts += pairs.len() as u64;
+        pairs.into_iter().map(|(i, j)| self.pair(i, j)).collect()
+    }
+
+    /// Returns the exact distance of each pair, in ascending order of the pairs.
+    pub(crate) fn lengths(&self) -> Vec<(Length, Contact)> {
+        let mut lengths = Vec::new();
+        for (i, a) in self.boxed_a.iter().enumerate() {
+            for (j, b) in self.boxed_b.iter().enumerate() {
+                lengths.push((Length::between(&a.corners, &b.corners), self.pair(i, j)));
+            }
+        }
+        lengths
+    }
+
+    /// Returns the corners, as placed, of the triangles that an answer names.
+    pub(crate) fn triangles(&self, answer: &Distance) -> Option<[&Boxed; 2]> {
+        let i = self.a.find(answer.object_a, answer.triangle_a)?;
+        let j = self.b.find(answer.object_b, answer.triangle_b)?;
+        Some([&self.boxed_a[i], &self.boxed_b[j]])
+    }
+
+    /// Returns the exact distance of the pair that an answer names, and the largest difference between two of its
+    /// coordinates.
+    pub(crate) fn named(&self, answer: &Distance, tally: &mut Tally) -> Option<(Length, f64)> {
+        let [a, b] = self.triangles(answer)?;
+        tally.lengths += 1;
+        Some((Length::between(&a.corners, &b.corners), a.span(b)))
+    }
+
+    /// Returns the same for the closest pair, which is the named one or a closer one.
+    pub(crate) fn distance(&self, named: (Length, f64), tally: &mut Tally) -> (Length, f64) {
+        let limit = named.0.floor().next_up();
+        let mut least = named;
+        for a in &self.boxed_a {
+            for b in &self.boxed_b {
+                if !certainly_farther(a, b, limit) {
+                    tally.lengths += 1;
+                    let length = Length::between(&a.corners, &b.corners);
+                    if length.is_less(&least.0) {
+                        least = (length, a.span(b));
+                    }
+                }
+            }
+        }
+        least
+    }
+
+    /// Returns the exact distances of up to three pairs that may be the nearest, of those closer than `reach`. Arithmetic in
+    /// f64 chooses them, which is fast enough for large meshes.
+    pub(crate) fn nearest(&self, reach: f64) -> Vec<Length> {
+        let [blocks_a, blocks_b] = self.blocks();
+        let nearest = blocks_a.nearest(&blocks_b, reach, 1e-9 * self.size);
+        let exact = |&(_, i, j): &(f64, usize, usize)| {
+            Length::between(&self.boxed_a[i].corners, &self.boxed_b[j].corners)
         };
-        let i = find(&self.a, answer.object_a, answer.triangle_a);
-        let j = find(&self.b, answer.object_b, answer.triangle_b);
-        let (a, b) = (&self.corners_a[i], &self.corners_b[j]);
-        let d = answer.distance;
-        let &Distance { object_a, triangle_a, object_b, triangle_b, .. } = answer;
-        let named = Contact { object_a, triangle_a, object_b, triangle_b };
-        assert_eq!(d == 0.0, self.contacts.contains(&named), "{named:?} at {d}");
-        assert_eq!(d == 0.0, !self.contacts.is_empty(), "{named:?} at {d}");
-        let pair = Length::between(a, b);
-        assert!(pair.is(d, self.tolerance), "{d} is not the distance of {named:?}");
-        assert!(answer.lower <= d && d <= answer.upper, "{answer:?}");
-        assert!(pair.compare(answer.lower).is_ge() && pair.compare(answer.upper).is_le(), "{answer:?}");
-        assert!(d == 0.0 || !self.nearest.is_empty(), "nothing is as near as {d}");
-        for &(nearest, i, j) in self.nearest.iter().take(3) {
-            let exact = Length::between(&self.corners_a[i], &self.corners_b[j]);
-            assert!(exact.compare(d - self.tolerance).is_ge(), "{d}, but pair {i}, {j} is {nearest} apart");
-            assert!(exact.compare(answer.lower).is_ge(), "{answer:?}, but pair {i}, {j} is {nearest} apart");
-        }
-        let gap = [0, 1, 2].map(|k| answer.point_a[k] - answer.point_b[k]);
-        let largest = gap.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
-        let length = largest * gap.iter().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt();
-        // Points of meshes far from the origin are rounded to the coarser spacing of f64 there.
-        let magnitude = answer.point_a.iter().chain(&answer.point_b).fold(0.0, |m: f64, x| m.max(x.abs()));
-        let rounding = 4.0 * f64::EPSILON * magnitude;
-        assert!((length - d).abs() <= self.tolerance + rounding, "{answer:?}: the points are {length} apart");
-        for (point, triangle) in [(answer.point_a, a), (answer.point_b, b)] {
-            let off = point_triangle(point, triangle);
-            assert!(off <= self.tolerance + rounding, "{answer:?}: a point is {off} off its triangle");
-        }
+        nearest.iter().take(3).map(exact).collect()
     }
 }

@@ -6,9 +6,10 @@
 //! in exact arithmetic.
 
 use crate::common::asked::ask;
+use crate::common::expected::Expected;
 use crate::common::shapes::{plate, soup, sphere};
-use crate::common::truth::Truth;
-use crate::common::{Random, Stored, Triangle, bake, baked, mesh, options, queriers, random_pose, stored};
+use crate::common::truth::Surface;
+use crate::common::{Random, Triangle, bake, baked, mesh, options, queriers, random_pose, stored};
 use bvh_bake::{prove_bounds, to_bytes};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::object::ObjectRecord;
@@ -50,7 +51,7 @@ fn files() -> Vec<Vec<u8>> {
 /// The mesh that is asked about beside them, and poses in which the two touch here and there, or are just apart.
 struct Other {
     bvh: Bvh,
-    stored: Vec<Stored>,
+    surface: Surface,
     poses: Vec<Pose>,
 }
 
@@ -61,14 +62,14 @@ impl Other {
         let near = [(); 2].map(|()| random_pose(random, 1.2));
         let apart = Pose::new(*random_pose(random, 0.0).rotation(), [1.6, 1.1, 0.9]).unwrap();
         let poses = near.into_iter().chain([apart]).collect();
-        Self { stored: stored(&bvh), bvh, poses }
+        Self { surface: Surface::new(stored(&bvh)), bvh, poses }
     }
 
     /// Compares the answers about a loosened file with brute force over the triangles of the file that it was made from.
-    fn check(&self, queriers: &mut [Querier], triangles: &[Stored], bytes: Vec<u8>, pose: &Pose) {
+    fn check(&self, queriers: &mut [Querier], surface: &Surface, bytes: Vec<u8>, pose: &Pose) {
         let loosened = Bvh::from_bytes(bytes).unwrap();
-        Truth::new(triangles, &self.stored, pose).check(&loosened, &self.bvh, pose, queriers);
-        Truth::new(&self.stored, triangles, pose).check(&self.bvh, &loosened, pose, queriers);
+        Expected::new(surface, &self.surface, pose).check(&loosened, &self.bvh, pose, queriers);
+        Expected::new(&self.surface, surface, pose).check(&self.bvh, &loosened, pose, queriers);
     }
 }
 
@@ -90,7 +91,7 @@ fn search(seed: u64, may_break: impl Fn(Rule) -> bool, edit: impl Fn(&mut Random
     let mut queriers = queriers();
     let (mut asked, mut refused) = (0, 0);
     for file in files() {
-        let triangles = stored(&Bvh::from_bytes(file.clone()).unwrap());
+        let surface = Surface::new(stored(&Bvh::from_bytes(file.clone()).unwrap()));
         for _ in 0..rounds(1) {
             let bytes = edit(random, &file);
             match prove(&bytes) {
@@ -102,7 +103,7 @@ fn search(seed: u64, may_break: impl Fn(Rule) -> bool, edit: impl Fn(&mut Random
                 Ok(()) => {
                     let other = Other::new(random);
                     let pose = &other.poses[random.below(other.poses.len())];
-                    other.check(&mut queriers, &triangles, bytes, pose);
+                    other.check(&mut queriers, &surface, bytes, pose);
                     asked += 1;
                 }
             }
@@ -145,7 +146,7 @@ fn an_anchor_beyond_the_child_that_leads_to_it_is_refused() {
     let mut queriers = queriers();
     let (mut refused, mut answered) = (0, 0);
     for file in files() {
-        let triangles = stored(&Bvh::from_bytes(file.clone()).unwrap());
+        let surface = Surface::new(stored(&Bvh::from_bytes(file.clone()).unwrap()));
         let (profile, roots) = (profile(&file), remote_roots(&file));
         if roots.is_empty() {
             // The smallest profile holds the mesh in one page.
@@ -158,16 +159,16 @@ fn an_anchor_beyond_the_child_that_leads_to_it_is_refused() {
             assert_eq!(validate(&bytes).unwrap_err().rule, Rule::Nested);
             let other = Other::new(random);
             let pose = &other.poses[random.below(2)];
-            let as_a = Truth::new(&triangles, &other.stored, pose);
-            let as_b = Truth::new(&other.stored, &triangles, pose);
+            let as_a = Expected::new(&surface, &other.surface, pose);
+            let as_b = Expected::new(&other.surface, &surface, pose);
             for querier in &mut queriers {
                 // A new querier has not opened any node.
                 *querier = Querier::with_backend(querier.backend());
                 let asked = ask(querier, &bytes, &other.bvh, pose).unwrap();
-                for (answers, truth) in asked.into_iter().zip([&as_a, &as_b]) {
+                for (answers, expected) in asked.into_iter().zip([&as_a, &as_b]) {
                     match answers.contacts {
                         Ok(contacts) => {
-                            assert_eq!(contacts, truth.contacts(), "{}", querier.backend());
+                            assert_eq!(contacts, expected.contacts(), "{}", querier.backend());
                             answered += 1;
                         }
                         Err(QueryError::Damaged(error)) => {

@@ -23,14 +23,25 @@ impl Boxed {
         Self { corners, low: end(f64::min), high: end(f64::max) }
     }
 
-    /// Returns a stand-in for many triangles: its box encloses all of theirs, and its corners mean nothing.
-    pub fn around(all: &[Self]) -> Self {
-        let join = |p: Self, q: &Self| Self {
+    /// Returns a stand-in for many triangles, or `None` for none: its box encloses all of theirs, and its corners mean nothing.
+    pub fn around<'a>(all: impl Iterator<Item = &'a Self>) -> Option<Self> {
+        let join = |p: Self, q: Self| Self {
             low: [0, 1, 2].map(|k| p.low[k].min(q.low[k])),
             high: [0, 1, 2].map(|k| p.high[k].max(q.high[k])),
             ..p
         };
-        all[1..].iter().fold(all[0], join)
+        all.copied().reduce(join)
+    }
+
+    /// Returns the axis along which the box is longest.
+    pub fn longest_axis(&self) -> usize {
+        let side = |k: &usize| self.high[*k] - self.low[*k];
+        (0..3).max_by(|i, j| side(i).total_cmp(&side(j))).unwrap()
+    }
+
+    /// Returns the middle of the box along an axis, rounded.
+    pub fn middle(&self, axis: usize) -> f64 {
+        self.low[axis] / 2.0 + self.high[axis] / 2.0
     }
 
     /// Returns whether the boxes share a point. The comparisons are exact.

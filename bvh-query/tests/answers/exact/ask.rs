@@ -4,8 +4,8 @@
 //! meshes touch, and the true distance of the placed meshes lies between `lower` and `upper`. `within` is exact on
 //! the placed meshes, too. All backends give the same answers.
 
-use super::tally::Tally;
-use super::truth::Truth;
+use crate::common::tally::Tally;
+use crate::common::truth::Truth;
 use bvh_query::{Bvh, Contact, Distance, DistanceOptions, Pose, Querier};
 use cbvh_testkit::exact::Length;
 

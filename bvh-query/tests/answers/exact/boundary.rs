@@ -2,9 +2,9 @@
 
 use super::ask::Asked;
 use super::kinds::{KINDS, turn};
-use super::tally::Tally;
-use super::truth::Surface;
 use super::walk::Walk;
+use crate::common::tally::Tally;
+use crate::common::truth::Surface;
 use crate::common::{Random, Triangle, bake, mesh, options, queriers, random_pose, rotation, size, stored};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;

@@ -4,8 +4,8 @@
 //! lies nearer, across that line and 2^128 times its size away. B is large as a whole, so that its steps count as small.
 
 use super::ask::Asked;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use crate::common::{Triangle, bake, mesh, options, queriers, stored, translation};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;

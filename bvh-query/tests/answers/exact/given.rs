@@ -5,8 +5,8 @@
 
 use super::ask::Asked;
 use super::kinds::exact_turns;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use crate::common::{Random, Stored, Triangle, bake, mesh, queriers, stored};
 use bvh_bake::Options;
 use bvh_format::leaf::TriangleEncoding;

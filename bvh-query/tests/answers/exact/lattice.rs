@@ -6,7 +6,7 @@
 //! terms, so it stays below 2^60.
 
 use super::kinds::exact_turns;
-use super::tally::Tally;
+use crate::common::tally::Tally;
 use crate::common::{Random, Triangle, bake, mesh, options, queriers};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;

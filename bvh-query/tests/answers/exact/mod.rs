@@ -15,8 +15,6 @@ mod lattice;
 mod near_tie;
 mod placement;
 mod subnormal;
-mod tally;
 mod tiny_origin;
 mod touching;
-mod truth;
 mod walk;

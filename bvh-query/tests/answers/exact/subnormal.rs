@@ -2,8 +2,8 @@
 //! there and rounding is absolute, for which filters must allow.
 
 use super::ask::Asked;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use crate::common::{Random, Triangle, bake, mesh, options, queriers, random_pose, stored};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;

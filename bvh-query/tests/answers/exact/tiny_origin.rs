@@ -2,8 +2,8 @@
 //! exact.
 
 use super::ask::Asked;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use crate::common::{baked, queriers, stored};
 use bvh_query::Pose;
 

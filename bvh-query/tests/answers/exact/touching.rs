@@ -5,8 +5,8 @@
 
 use super::ask::Asked;
 use super::kinds::exact_turns;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use crate::common::{Random, Triangle, baked, queriers, stored};
 use bvh_query::{Pose, Querier};
 use cbvh_testkit::depth::rounds;

@@ -1,8 +1,8 @@
 //! Moves a pose to where the meshes start to touch, until two neighbouring f64 numbers give different answers.
 
 use super::ask::Asked;
-use super::tally::Tally;
-use super::truth::{Surface, Truth};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
 use bvh_query::Pose;
 
 /// Two meshes, and poses that depend on one parameter.

@@ -1,10 +1,11 @@
 //! The open data of overlaps with labelled depths, and its purely geometric check: no triangles meet after the translation.
 
 use super::{moved, penetration};
-use crate::common::{bake, corners, placed, queriers, shared, shared_mesh, stored};
+use crate::common::tally::Tally;
+use crate::common::truth::{Surface, Truth};
+use crate::common::{bake, queriers, shared, shared_mesh, stored};
 use bvh_bake::Options;
 use bvh_query::{PenetrationOptions, Pose, QueryError};
-use cbvh_testkit::exact::{Boxed, Decided, intersect};
 
 /// A pose and the interval that its depth is in; none where the question has no answer.
 type Labelled = (Pose, Option<[f64; 2]>);
@@ -36,7 +37,7 @@ fn labelled_depths_are_between_the_bounds() {
         let [a, b] = [words[1], words[2]]
             .map(|name| bake(&shared_mesh(&format!("../depth/{name}")), &Options::default()));
         let poses = std::fs::read_to_string(pairs.with_file_name(format!("{}.txt", words[0]))).unwrap();
-        let [of_a, of_b] = [&a, &b].map(|bvh| corners(&stored(bvh)));
+        let [of_a, of_b] = [&a, &b].map(|bvh| Surface::new(stored(bvh)));
         for (number, (pose, depth)) in read(&poses).into_iter().enumerate().step_by(3) {
             let Some([low, high]) = depth else {
                 let refused = queriers[0].penetration(&a, &b, &pose, &PenetrationOptions::new());
@@ -54,12 +55,9 @@ fn labelled_depths_are_between_the_bounds() {
             } else {
                 assert!(found.lower == 0.0 && found.upper < 1e-11, "{context}");
             }
-            if number % 9 == 0 && of_a.len() * of_b.len() < 40_000 {
-                let moved: Vec<_> =
-                    placed(&of_b, &moved(&pose, found.translation)).into_iter().map(Boxed::new).collect();
-                let of_a: Vec<_> = of_a.iter().copied().map(Boxed::new).collect();
-                let meets = |a: &Boxed, b: &Boxed| intersect(a, b, &mut Decided::default());
-                assert!(of_a.iter().all(|a| moved.iter().all(|b| !meets(a, b))), "{context}");
+            if number % 9 == 0 && of_a.stored.len() * of_b.stored.len() < 40_000 {
+                let after = Truth::new(&of_a, &of_b, &moved(&pose, found.translation));
+                assert!(!after.collide(&mut (0, 0), &mut Tally::default()), "{context}");
             }
         }
     }

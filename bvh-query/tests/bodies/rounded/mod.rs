@@ -5,7 +5,8 @@ mod solids;
 
 use crate::common::nearest::point_triangle;
 use crate::common::shapes::{cube, outward, plate, soup, sphere, torus};
-use crate::common::{Random, Stored, Triangle, baked, placed, queriers, random_pose, stored, translation};
+use crate::common::truth::{self, Surface};
+use crate::common::{Random, Triangle, baked, placed, queriers, random_pose, stored, translation};
 use bvh_query::{
     Bvh, Contact, Distance, Motion, MotionAnswer, MotionOptions, Pose, Querier, QueryError, Ray, Relation,
     Side, Tracker,
@@ -31,34 +32,21 @@ fn lattice_core(random: &mut Random, count: usize) -> Vec<Triangle> {
 }
 
 struct Truth {
-    a: Vec<Stored>,
-    b: Vec<Stored>,
+    a: Vec<Triangle>,
     placed_b: Vec<Triangle>,
-    lengths: Vec<(Length, usize, usize)>,
+    lengths: Vec<(Length, Contact)>,
 }
 
 impl Truth {
     fn new(a: &Bvh, b: &Bvh, pose: &Pose) -> Self {
-        let (a, b) = (stored(a), stored(b));
-        let placed_b = placed(&crate::common::corners(&b), pose);
-        let mut lengths = Vec::new();
-        for (i, of_a) in a.iter().enumerate() {
-            for (j, of_b) in placed_b.iter().enumerate() {
-                lengths.push((Length::between(&of_a.corners, of_b), i, j));
-            }
-        }
-        Self { a, b, placed_b, lengths }
+        let [a, b] = [a, b].map(|bvh| Surface::new(stored(bvh)));
+        let lengths = truth::Truth::new(&a, &b, pose).lengths();
+        Self { placed_b: placed(&b.corners, pose), a: a.corners, lengths }
     }
 
     fn within(&self, sum: f64) -> Vec<Contact> {
         let near = self.lengths.iter().filter(|(length, ..)| length.compare(sum).is_le());
-        near.map(|&(_, i, j)| Contact {
-            object_a: self.a[i].object,
-            triangle_a: self.a[i].id,
-            object_b: self.b[j].object,
-            triangle_b: self.b[j].id,
-        })
-        .collect()
+        near.map(|&(_, pair)| pair).collect()
     }
 
     fn is_within(&self, sum: f64) -> bool {
@@ -78,7 +66,7 @@ impl Truth {
         let off = |point, triangles: &mut dyn Iterator<Item = &Triangle>| {
             triangles.map(|triangle| point_triangle(point, triangle)).fold(f64::INFINITY, f64::min)
         };
-        let off_a = off(answer.point_a, &mut self.a.iter().map(|stored| &stored.corners));
+        let off_a = off(answer.point_a, &mut self.a.iter());
         let off_b = off(answer.point_b, &mut self.placed_b.iter());
         if answer.distance == 0.0 {
             assert!(off_a <= radii[0] + TOLERANCE && off_b <= radii[1] + TOLERANCE, "{answer:?}");

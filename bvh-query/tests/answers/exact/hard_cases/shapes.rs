@@ -1,6 +1,6 @@
 //! Makes small meshes of dyadic coordinates, and changes them exactly.
 
-use crate::Triangle;
+use cbvh_testkit::Triangle;
 
 /// Returns a power of two.
 pub(super) fn two(exponent: i32) -> f64 {
@@ -29,16 +29,9 @@ pub(super) fn unit_cube() -> Vec<Triangle> {
 
 /// Returns n x n squares of two triangles each, in the plane z = 0 from 0 to n.
 pub(super) fn plate(n: usize) -> Vec<Triangle> {
-    terrain(n, |_, _| 0.0)
-}
-
-/// Returns the same squares with a height at each corner.
-pub(super) fn terrain(n: usize, height: impl Fn(usize, usize) -> f64) -> Vec<Triangle> {
-    let at = |x: usize, y: usize| [x as f64, y as f64, height(x, y)];
     let square = |k: usize| {
-        let (x, y) = (k % n, k / n);
-        let [p, q, r, s] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
-        [[p, q, r], [r, q, s]]
+        let at = |x: usize, y: usize| [(k % n + x) as f64, (k / n + y) as f64, 0.0];
+        [[at(0, 0), at(1, 0), at(0, 1)], [at(0, 1), at(1, 0), at(1, 1)]]
     };
     (0..n * n).flat_map(square).collect()
 }
@@ -49,13 +42,6 @@ pub(super) fn octahedron(reach: f64) -> Vec<Triangle> {
     (0..8)
         .map(|bits| [[sign(bits, 0), 0.0, 0.0], [0.0, sign(bits, 1), 0.0], [0.0, 0.0, sign(bits, 2)]])
         .collect()
-}
-
-/// Returns a needle from `tail` to `tip`: four triangles around a square tail in the plane z = `tail[2]`.
-pub(super) fn needle(tail: [f64; 3], tip: [f64; 3], half: f64) -> Vec<Triangle> {
-    let corner = |x: f64, y: f64| [tail[0] + x * half, tail[1] + y * half, tail[2]];
-    let ring = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-    (0..4).map(|k| [ring[k], ring[(k + 1) % 4], tip]).collect()
 }
 
 /// Scales a mesh by a power of two.

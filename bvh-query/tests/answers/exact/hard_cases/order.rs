@@ -1,25 +1,25 @@
 //! Reorders the corners, the triangles and the two sides of a case, none of which may change the answer.
 
-use super::{Case, Truth};
-use crate::Triangle;
+use super::case::{Case, Truth};
+use cbvh_testkit::Triangle;
 
 /// A case in one order.
-pub struct Ordered {
+pub(super) struct Ordered {
     /// The name of the order.
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// Mesh A.
-    pub a: Vec<Triangle>,
+    pub(super) a: Vec<Triangle>,
     /// Mesh B, before the pose places it.
-    pub b: Vec<Triangle>,
+    pub(super) b: Vec<Triangle>,
     /// The rows of the 3 by 4 matrix that places B in the frame of A.
-    pub pose: [f64; 12],
+    pub(super) pose: [f64; 12],
 }
 
 impl Case {
     /// Returns the case as listed, with corners rotated and triangles reversed, and with corners reversed. If the
     /// inverse pose places corners without rounding, so that the truth is the same, returns it also with A and B
     /// swapped.
-    pub fn orders(&self) -> Vec<Ordered> {
+    pub(super) fn orders(&self) -> Vec<Ordered> {
         let ordered = |name, order: [usize; 3], backward: bool| {
             let side = |triangles: &[Triangle]| {
                 let mut side: Vec<_> = triangles.iter().map(|t| order.map(|k| t[k])).collect();

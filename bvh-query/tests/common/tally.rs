@@ -1,6 +1,6 @@
 //! Counts what was searched: queries, widths of intervals, wrong answers.
 
-use crate::common::note;
+use super::note;
 use cbvh_testkit::exact::Decided;
 
 /// The most wrong answers that are kept; the search ends when there are as many.
