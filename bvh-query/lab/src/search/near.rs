@@ -9,10 +9,10 @@
 use super::stars::Stars;
 use super::{Counts, any_layout, bake, case, check, fewest, queriers};
 use crate::Failure;
-use crate::common::{Random, Stored, Triangle, placed};
-use crate::exact::ask::{Asked, difference};
 use crate::common::tally::Tally;
 use crate::common::truth::{Surface, Truth};
+use crate::common::{Random, Stored, Triangle, placed};
+use crate::exact::ask::{Asked, difference};
 use bvh_bake::Options;
 use bvh_query::{Bvh, Contact, Motion, MotionAnswer, MotionOptions, Pose, Querier, QueryError, RigidPath};
 use cbvh_testkit::exact::{Boxed, Decided, Length, intersect};
