@@ -6,6 +6,7 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::validate::validate;
 use bvh_format::{FormatError, Rule};
 use cbvh_testkit::Random;
+use cbvh_testkit::damage::mislead;
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::{put, seal, section};
 use std::collections::BTreeSet;
@@ -54,17 +55,7 @@ fn golden_and_damaged_files_are_told_alike() {
         rules.extend(told.err().map(|error| error.rule));
         for round in 0..if name.starts_with("ok-") { rounds(15) } else { 5 } {
             let mut bytes = golden.clone();
-            for _ in 0..1 + round % 4 {
-                // The part of a page, block or table that is in use lies at its start.
-                let place = section(&golden, [1, 2, 2, 3, 4, 5][random.below(6)]);
-                let place = if place.len() < 4 { 0..golden.len() } else { place };
-                let at = place.start + random.below(place.len().min(700)) / 4 * 4;
-                let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, random.bits() as u32];
-                let value = values[random.below(values.len())].to_le_bytes();
-                if at + 4 <= bytes.len() {
-                    put(&mut bytes, at, &value);
-                }
-            }
+            mislead(&mut bytes, &golden, 1 + round % 4, &mut random);
             if round % 3 > 0 && bytes.len() >= 64 {
                 seal(&mut bytes);
             }

@@ -1,7 +1,7 @@
-//! Damages files in any of the ways in which bytes go wrong: at random, but mostly where structures are.
+//! Damages files in any of the ways in which bytes go wrong, at random but mostly where structures are, and misstates their numbers.
 
 use crate::Random;
-use crate::seal::{put, section};
+use crate::seal::{put, seal, section};
 
 /// Returns a place in a file of any bytes, more often one that is in use: near the start of a page or of a section.
 pub fn place_in_file(bytes: &[u8], random: &mut Random) -> usize {
@@ -12,6 +12,39 @@ pub fn place_in_file(bytes: &[u8], random: &mut Random) -> usize {
     };
     let within = if random.below(3) == 0 { random.below(4096) } else { random.below(512) };
     (start + within).min(bytes.len() - 1)
+}
+
+/// Replaces so many words of a file, most of them in its tables and pages, by values that mislead readers. The sections are found in
+/// `original`, where no word misleads yet.
+pub fn mislead(bytes: &mut [u8], original: &[u8], words: u64, random: &mut Random) {
+    for _ in 0..words {
+        let place = section(original, [1, 2, 2, 3, 4, 5, 6, 1][random.below(8)]);
+        let place = if place.len() < 4 { section(original, 2) } else { place };
+        let place = if place.len() < 4 { 0..original.len() } else { place };
+        // The part of a page, block or table that is in use lies at its start.
+        let at = place.start + random.below(place.len().min(700)) / 4 * 4;
+        let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, 0x7f80_0000, random.bits() as u32];
+        let value = values[random.below(values.len())].to_le_bytes();
+        if at + 4 <= bytes.len() {
+            put(bytes, at, &value);
+        }
+    }
+}
+
+/// Returns files that state too large numbers, and what each states: every word of the header, the section table, the object table
+/// and the first page header is set to large values in turn. All checksums are right.
+pub fn overstated(honest: &[u8]) -> impl Iterator<Item = (String, Vec<u8>)> {
+    let (objects, nodes) = (section(honest, 1).start, section(honest, 2).start);
+    let places = (8..40).step_by(4).chain((64..256).step_by(4));
+    let places = places.chain((0..16 + 192).step_by(4).map(move |at| objects + at));
+    let places = places.chain((0..64).step_by(4).map(move |at| nodes + at));
+    let values = [u32::MAX, i32::MAX as u32, 1 << 20];
+    places.flat_map(move |place| values.map(|value| (place, value))).map(|(place, value)| {
+        let mut bytes = honest.to_vec();
+        put(&mut bytes, place, &value.to_le_bytes());
+        seal(&mut bytes);
+        (format!("byte {place}, {value:#x}"), bytes)
+    })
 }
 
 /// Damages a file in one way, whose name it returns. Parts of `other` may replace parts of the file. What is too short for

@@ -3,23 +3,15 @@
 
 use crate::common::{TESTDATA, cbvh_in, cube};
 use cbvh_testkit::Random;
+use cbvh_testkit::damage::mislead;
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::{put, seal, section};
 use std::path::Path;
 
-/// Returns the golden file with a few words of one section replaced.
+/// Returns the golden file with a few words replaced.
 fn forged(golden: &[u8], seed: u64) -> Vec<u8> {
     let (mut bytes, mut random) = (golden.to_vec(), Random::new(seed));
-    // Half of the changed words are in the tables and pages. A section that the file does not have is empty.
-    let place = section(golden, [1, 2, 2, 3, 4, 5, 6, 1][random.below(8)]);
-    let place = if place.len() < 4 { section(golden, 2) } else { place };
-    for _ in 0..1 + seed % 3 {
-        // The part of a page that is in use is at its start.
-        let most = place.len().min(512);
-        let at = place.start + (random.below(most) / 4 * 4).min(place.len().saturating_sub(4));
-        let values = [0, 1, 0xff, u32::MAX, 0x7fc0_0000, 0x7f80_0000, random.bits() as u32];
-        put(&mut bytes, at, &values[random.below(values.len())].to_le_bytes());
-    }
+    mislead(&mut bytes, golden, 1 + seed % 3, &mut random);
     seal(&mut bytes);
     bytes
 }
