@@ -175,7 +175,7 @@ fn boxes_have_the_classes_that_integers_say() {
     let mut random = Random::new(26);
     let mut queriers = queriers();
     let mut counts = [0; 8];
-    for _ in 0..400 {
+    for _ in 0..900 {
         let mut grid_box = |at: i64| -> GridBox {
             [[(); 3].map(|()| at + random.below(60) as i64), [(); 3].map(|()| 100 + random.below(40) as i64)]
         };
@@ -205,8 +205,8 @@ fn boxes_have_the_classes_that_integers_say() {
             assert!(is_right, "{one:?} {other:?} {tolerance}: {class:?}, not {expected:?}");
         }
     }
-    // All of the first four classes.
-    assert!(counts[..4].iter().all(|count| *count > 50), "{counts:?}");
+    // All of the first four classes, on each backend.
+    assert!(counts[..4].iter().all(|count| *count > 40 * queriers.len()), "{counts:?}");
 }
 
 /// What a scene says of boxes with margins is what integers say of their gaps, less the margins.
