@@ -8,7 +8,7 @@ use bvh_format::object::MAX_COORDINATE;
 
 /// A motion of B in A's frame, over times from 0 to 1.
 ///
-/// [`Motion`] and [`Polyline`] are paths. Implement it for others, such as a link of a robot whose joints move.
+/// [`Motion`] and [`Polyline`](crate::Polyline) are paths. Implement it for others, such as a link of a robot whose joints move.
 pub trait RigidPath {
     /// Returns where B is at a time from 0 to 1. The same time must always give the same pose, to the bit.
     fn pose(&self, t: f64) -> Pose;
