@@ -1,13 +1,16 @@
-"""Makes a page of tables and plots of the raw times of run.py.
+"""Makes a page, plots and CSV files of the raw times of run.py.
 
     python report.py DIR [--page FILE] [--subject cbvh]
 
 The time of a pose is the median over the steady rounds, and a cell has the median of these over the poses. The 99th percentile is over all
-single queries. A library with a wrong answer in a cell is marked there, and counts neither as best nor as other. One whose budget
-did not suffice for all poses is marked too: its time is about the first of them. The subject is the library that the ratios are about. What it loses comes first. Needs Python alone.
+single queries. A library with a wrong answer in a cell counts neither as best nor as other there. One whose budget did not suffice for all
+poses has fewer of them: its time is about the first ones. The subject is the library that the ratios are about. The page has the ratios,
+and what the subject loses comes first; the CSV files have all times. Needs Python alone.
 """
 
 import argparse
+import csv
+import io
 import json
 import os
 import sys
@@ -112,26 +115,37 @@ def losses(cells, subject):
     return [row for _, row in sorted(found)]
 
 
-def main_table(cells, question, subject, names):
+def ratio_table(cells, question, subject):
+    """Returns a row for each pair: how many times as long as the subject the best other library takes, by the gap."""
+    keys = ordered(cells, question)
+    gaps = [preset for preset in PRESETS if any(key[2] == preset for key in keys)]
     rows = []
-    for key in ordered(cells, question):
-        row, texts = cells[key], []
-        right = [cell.median for cell in row.values() if not cell.wrong]
-        poses = max(cell.poses for cell in row.values())
-        for name in names:
-            cell = row.get(name)
-            if cell is None:
-                texts.append("")
-            elif cell.wrong:
-                texts.append(f"{microseconds(cell.median)}, {len(cell.wrong)} of {cell.poses} wrong")
-            else:
-                fewer = f", {cell.poses} poses" if cell.poses < poses else ""
-                text = f"{microseconds(cell.median)} ({microseconds(cell.p99)}{fewer})"
-                texts.append(f"**{text}**" if cell.median == min(right) else text)
-        share = ratio(row, subject)
-        rows.append([key[1], key[2], *texts, f"{share:.1f}" if share else ""])
-    used = [k for k, name in enumerate(names) if any(row[k + 2] for row in rows)]
-    return table(["pair", "gap", *(names[k] for k in used), f"best other / {subject}"], [[*row[:2], *(row[k + 2] for k in used), row[-1]] for row in rows])
+    for pair in dict.fromkeys(pair for _, pair, _ in keys):
+        shares = [ratio(cells.get((question, pair, gap), {}), subject) for gap in gaps]
+        rows.append([pair, *(f"{share:.1f}" if share else "" for share in shares)])
+    return table(["pair", *gaps], rows)
+
+
+def wrong_table(cells):
+    rows = []
+    for key, row in cells.items():
+        rows += [[name, *key, f"{len(cell.wrong)} of {cell.poses}"] for name, cell in row.items() if cell.wrong]
+    return table(["library", "question", "pair", "gap", "wrong"], sorted(rows))
+
+
+def comma_separated(names, rows):
+    output = io.StringIO()
+    csv.writer(output, lineterminator="\n").writerows([names, *rows])
+    return output.getvalue()
+
+
+def queries_file(cells):
+    """Returns the CSV file of all cells, in microseconds."""
+    rows = []
+    for question in QUESTIONS:
+        for key in ordered(cells, question):
+            rows += [[*key, name, cell.poses, len(cell.wrong), *(f"{x / 1000:.2f}" for x in (cell.median, cell.p99, cell.cold))] for name, cell in cells[key].items()]
+    return comma_separated(["question", "pair", "gap", "library", "poses", "wrong", "median", "99th percentile", "cold"], rows)
 
 
 def costs(record):
@@ -149,21 +163,33 @@ def short(value):
     return "" if value is None else f"{value:.3g}" if value < 100 else f"{value:,.0f}"
 
 
-def build_table(builds):
-    rows = [[record["pair"], record["runner"], *map(short, costs(record).values())] for record in builds]
-    return table(["pair", "library", *costs(builds[0])], rows)
+def builds_file(builds):
+    rows = [[record["pair"], record["runner"], *("" if value is None else f"{value:.4g}" for value in costs(record).values())] for record in builds]
+    return comma_separated(["pair", "library", *costs(builds[0])], rows)
 
 
-def dearer(builds, subject):
-    """Returns where another library is ready sooner, or smaller."""
-    rows = []
+def build_table(builds, subject):
+    """Returns a row for each pair: what the subject costs, and what is least among the others."""
+    names, rows = list(costs(builds[0])), []
     for record in (record for record in builds if record["runner"] == subject):
         others = [other for other in builds if other["pair"] == record["pair"] and other is not record]
+        cells = []
         for name, own in costs(record).items():
             best = min(((costs(other)[name], other["runner"]) for other in others if costs(other)[name] is not None), default=None)
-            if own is not None and best is not None and best[0] < own:
-                rows.append([record["pair"], name, short(own), best[1], short(best[0])])
-    return rows
+            cells += [short(own), f"{short(best[0])}, {best[1]}" if best else ""]
+        rows.append([record["pair"], *cells])
+    return table(["pair", *(head for name in names for head in (name, "least other"))], rows)
+
+
+def later_pairs(builds, subject):
+    """Returns the pairs of which another library gives the first answer from the mesh sooner."""
+    ready = lambda record: costs(record)["first answer from the mesh, ms"]
+    found = []
+    for record in (record for record in builds if record["runner"] == subject and ready(record) is not None):
+        others = [ready(other) for other in builds if other["pair"] == record["pair"] and other is not record]
+        if any(other is not None and other < ready(record) for other in others):
+            found.append(record["pair"])
+    return found
 
 
 def plot(title, labels, lines, x_title, colours):
@@ -210,28 +236,36 @@ def plots(cells, names):
 
 
 def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
-    """Returns the lines of the page of results. Its plots are in a folder."""
-    names = list(head["runners"])
+    """Returns the lines of the page of results. Its plots and CSV files are in a folder."""
     wrong = sum(len(cell.wrong) for row in cells.values() for cell in row.values())
     lost = losses(cells, subject)
     compared = sum(ratio(row, subject) is not None for row in cells.values())
     where = f"on one {'pinned ' if head['pinned'] else ''}core of {head['processor']}, {head['system']}"
+    plotted = lambda wanted: [f"![{file[:-4]}]({folder}{file})" for file in drawn if wanted(file)]
+    of_size = lambda file: file.endswith("-scaling.svg")
     lines = ["# Speed", "", f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}.", "",
-             "Times are medians over the poses in microseconds, with the 99th percentile of all single queries in brackets. Each answer is compared with what is",
-             f"proved. {wrong or 'No'} answers are wrong, counted once for each pose, and a library with a wrong answer in a cell is not counted as best there. The fastest library that is right is in",
-             f"bold. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away: there, `collide` shows what a call costs. [What is timed]({readme})", "",
-             "## In short", "", *summary(builds, cells, subject), "", f"## Where {subject} loses", ""]  # fmt: skip
+             "Times are medians over the poses, in microseconds. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away: there,",
+             f"`collide` shows what a call costs. Each answer is compared with what is proved; {wrong or 'no'} answers are wrong, counted once for each pose. A library",
+             f"with a wrong answer in a cell is not counted as best there. All times of all libraries are in [queries.csv]({folder}queries.csv) and", f"[builds.csv]({folder}builds.csv). [What is timed]({readme})", "",
+             "## In short", "", *summary(builds, cells, subject), ""]  # fmt: skip
+    if sizes := plotted(of_size):
+        lines += [*sizes, ""]
+    lines += [f"## Where {subject} loses", ""]
     if lost:
         lines += [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
     else:
         lines.append(f"No other library is faster in any of {compared} comparisons of queries.")
-    if dear := dearer(builds, subject):
-        lines += ["", "Before the first answer:", "", *table(["pair", "", subject, "less", "its figure"], dear)]
+    if later := later_pairs(builds, subject):
+        lines += ["", f"The first answer from the mesh, the build included, comes later than that of another library for {', '.join(later)}."]
+    lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes whose answers are right."]
     for question, title in QUESTIONS.items():
         if any(key[0] == question for key in cells):
-            lines += ["", f"## {title} (`{question}`)", "", *main_table(cells, question, subject, names)]
-            lines += ["", *(f"![{file[:-4]}]({folder}{file})" for file in drawn if file.startswith(question + "-"))]
-    lines += ["", "## Builds, memory, and the first answer", "", "Both meshes together. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds)]
+            lines += ["", f"### {title} (`{question}`)", "", *ratio_table(cells, question, subject)]
+            if charts := plotted(lambda file: file.startswith(question + "-") and file.endswith(".svg") and not of_size(file)):
+                lines += ["", *charts]
+    if wrong:
+        lines += ["", "## Wrong answers", "", *wrong_table(cells)]
+    lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds, subject)]
     if batches:
         rows = [[b["pair"], b["runner"], b["batch"], b["preset"], str(b["queries"]), str(b["threads"]), microseconds(1e9 * b["seconds"] / b["queries"])] for b in batches]
         lines += ["", "## Many poses in one call, on all cores", "", *table(["pair", "library", "question", "gap", "queries", "threads", "time per query"], rows)]
@@ -242,11 +276,11 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
 
 
 def made(folder, place, subject=None):
-    """Returns the plots of the raw times in a folder, by name, and the page that is to be in a place."""
+    """Returns the plots and CSV files of the raw times in a folder, by name, and the page that is to be in a place."""
     head, builds, batches, failed, cells = read(folder)
     names = list(head["runners"])
     subject = subject or ("cbvh" if "cbvh" in names else names[0])
-    drawn = plots(cells, names)
+    drawn = plots(cells, names) | {"queries.csv": queries_file(cells), "builds.csv": builds_file(builds)}
     to_folder, readme = (Path(os.path.relpath(to, place.parent)).as_posix() for to in (folder, Path(__file__).parent / "README.md"))
     lines = page(head, builds, batches, failed, cells, subject, drawn, "" if to_folder == "." else to_folder + "/", readme)
     return drawn, "\n".join(lines) + "\n"

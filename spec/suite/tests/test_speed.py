@@ -47,7 +47,7 @@ def exactly(corners, faces, pose):
 
 
 class Page(unittest.TestCase):
-    def test_the_page_has_the_tables_of_the_raw_times(self):
+    def test_page_plots_and_files_are_those_of_the_raw_times(self):
         drawn, text = report.made(SUITE / "speed" / "results", SUITE / "SPEED.md")
         self.assertEqual((SUITE / "SPEED.md").read_text(encoding="utf-8"), text)
         for file, plotted in drawn.items():
@@ -121,7 +121,7 @@ class Poses(unittest.TestCase):
 
 
 def timed(folder, *arguments):
-    """Runs a smoke test of the runner of these tests, and returns the exit code and the page."""
+    """Runs a smoke test of the runner of these tests, and returns the exit code and the page, or the errors."""
     command = [sys.executable, str(SUITE / "tests" / "gaps_runner.py"), *arguments]
     joined = shlex.join(command) if os.name == "posix" else subprocess.list2cmdline(command)
     done = subprocess.run([sys.executable, str(RUN), "--out", folder, "--smoke", "--runner", f"gaps={joined}"], capture_output=True, text=True, check=False)
@@ -133,15 +133,15 @@ class Runs(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             code, page = timed(folder)
             self.assertEqual(code, 0, page)
-            self.assertIn("No answers are wrong", page)
-            self.assertIn("| scan-1k | touching | **", page)
+            self.assertIn("no answers are wrong", page)
+            self.assertIn("collide,scan-1k,touching,gaps,2,0,", (Path(folder) / "queries.csv").read_text(encoding="utf-8"))
             self.assertTrue((Path(folder) / "distance-scan-1k.svg").read_text(encoding="utf-8").startswith("<svg"))
 
     def test_a_liar_is_marked_and_never_best(self):
         with tempfile.TemporaryDirectory() as folder:
             code, page = timed(folder, "7")
             self.assertEqual(code, 1)
-            self.assertIn("of 2 wrong", page)
+            self.assertIn("2 of 2 |", page)
 
     def test_a_runner_that_ends_is_named(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -169,11 +169,15 @@ class Reports(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "times.jsonl").write_text("\n".join(map(json.dumps, lines)), encoding="utf-8")
             report.main([folder])
-            page = (Path(folder) / "SPEED.md").read_text(encoding="utf-8")
+            page, queries, builds = ((Path(folder) / file).read_text(encoding="utf-8") for file in ("SPEED.md", "queries.csv", "builds.csv"))
         self.assertIn("In 1 of 1 comparisons of queries", page)
         self.assertIn("| collide | p | 1% | 2.00 | x | 1.00 | 2.00 |", page)
-        self.assertIn("| p | 1% | 2.00 (2.00) | **1.00 (1.00)** | 0.01, 1 of 2 wrong | 0.5 |", page)
-        self.assertIn("| p | build, ms | 200 | x | 100 |", page)
+        self.assertIn("| pair | 1% |\n|---|---|\n| p | 0.5 |", page)
+        self.assertIn("| y | collide | p | 1% | 1 of 2 |", page)
+        self.assertIn("| p | 200 | 100, x | 100 | 100, x |", page)
+        self.assertIn("comes later than that of another library for p.", page)
+        self.assertIn("collide,p,1%,x,2,0,1.00,1.00,100.00\ncollide,p,1%,y,2,1,0.01,0.01,1.00\n", queries)
+        self.assertIn("p,x,100,100,100,\n", builds)
         self.assertLess(page.index("loses"), page.index("Do the two touch?"))
 
 
