@@ -1,6 +1,7 @@
 """A truth that is changed, a case that breaks the schema and a mesh that is changed are all found."""
 
 import copy
+import csv
 import json
 import subprocess
 import sys
@@ -12,6 +13,7 @@ SUITE = Path(__file__).parent.parent
 sys.path.insert(0, str(SUITE))
 
 import check
+import compare
 import exact
 import meshes
 from schema import problems
@@ -36,6 +38,12 @@ class Checks(unittest.TestCase):
             self.assertIn(f"| `{path.stem}` |", text)
         version = (SUITE / "VERSION").read_text().strip()
         self.assertIn(f"\nversion: {version}\n", (SUITE / "CITATION.cff").read_text())
+
+    def test_the_results_are_those_of_all_questions(self):
+        with open(SUITE / "results.csv", encoding="utf-8", newline="") as stream:
+            columns, *rows = csv.reader(stream)
+        self.assertEqual(columns, list(compare.COLUMNS))
+        self.assertIn("\n".join(["", *compare.summary(rows), ""]), (SUITE / "RESULTS.md").read_text(encoding="utf-8"))
 
     def test_a_changed_truth_is_found(self):
         changed = 0
