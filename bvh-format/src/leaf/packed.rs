@@ -117,6 +117,13 @@ pub struct PackedHead {
     pub pool_at: u32,
 }
 
+/// The first bit of a byte of a block. A head that was not checked may state any byte. Beyond the largest block, all bytes read as
+/// zero, and places in bits fit into 32.
+#[inline(always)]
+fn first_bit(byte: u32) -> usize {
+    byte.min(1 << 28) as usize * 8
+}
+
 impl PackedHead {
     /// Reads the head, or returns `None` if the block is shorter.
     #[inline]
@@ -232,7 +239,7 @@ impl PackedHead {
             further_words: [0; 2],
         };
         if record.count() > RECORD_SLOTS {
-            let further = load_wide(block, self.further_at as usize * 8 + record.first_further() * width);
+            let further = load_wide(block, first_bit(self.further_at) + record.first_further() * width);
             record.further_words = [further as u64, (further >> (4 * width)) as u64];
         }
         record
@@ -259,7 +266,7 @@ impl PackedHead {
     /// The bit of the block at which the vertex in a place of the pool starts.
     #[inline(always)]
     fn vertex_at(&self, place: u32) -> usize {
-        self.pool_at as usize * 8 + place as usize * self.stride()
+        first_bit(self.pool_at) + place as usize * self.stride()
     }
 
     /// Reads the integers of a packet's vertices, by axis. Bytes beyond the block read as zero.

@@ -2,8 +2,8 @@
 //!
 //! Links lead only to later pages, so that one pass is enough. It keeps the levels of roots whose pages come later.
 
-use bvh_format::page::decode::decode_page;
 use bvh_format::object::Object;
+use bvh_format::page::decode::decode_page;
 use bvh_format::page::{Page, RootRef, check_page};
 use bvh_format::slabs::NodeSlabs;
 use bvh_format::treelet::Child;
