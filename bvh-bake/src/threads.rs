@@ -14,6 +14,16 @@ pub(crate) use sequential::{
 /// The number of small items that a thread takes at a time.
 const RUN: usize = 1 << 13;
 
+/// Does two things side by side if `pays`, and otherwise one after the other. A thread takes longer to wake than a small
+/// mesh takes to bake.
+pub(crate) fn join_if<A: Send, B: Send>(
+    pays: bool,
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    if pays { join(a, b) } else { (a(), b()) }
+}
+
 /// Changes each item, given its number.
 pub(crate) fn change<T: Send>(items: &mut [T], change: impl Fn(usize, &mut T) + Sync) {
     map(items.chunks_mut(RUN).enumerate(), |(run, items)| {

@@ -14,9 +14,10 @@ use crate::input::gather::Gatherer;
 use crate::input::{Checksums, InputFile};
 use crate::options::Options;
 use crate::progress::{Progress, Step};
+use crate::storage::atomic::{self, SCRATCH_NAME};
+use crate::storage::disk_space;
 use crate::storage::output::Output;
 use crate::storage::resources::{Allowance, READING_BYTES, Resources};
-use crate::storage::{self, atomic, disk_space};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -147,7 +148,10 @@ impl<'a> FileBake<'a> {
         let may_be_up_to_date = !self.force && self.output.exists();
         let readings = if may_be_up_to_date { 2 } else { 1 };
         self.progress.expect(Step::Read, file_lengths(&self.inputs).saturating_mul(readings));
-        storage::remove_stale(self.scratch_directory());
+        atomic::remove_stale_beside(&self.output);
+        if let Some(scratch) = &self.scratch {
+            atomic::remove_stale(scratch, &[SCRATCH_NAME.as_ref()]);
+        }
         bake::check_numbers(&self.options)?;
         // If the budget is too small for any mesh, the inputs are not even read.
         self.require_memory(0, Resources::least(0))?;
@@ -167,8 +171,10 @@ impl<'a> FileBake<'a> {
                 return Ok(Outcome::UpToDate(summary));
             }
         }
-        // If the output cannot be written, the bake fails here, before the work.
-        drop(Output::beside(&self.output, &self.progress)?);
+        // If the output cannot be written, the bake fails here, before the work. Without a memory budget, the output stays in
+        // memory until it is proved.
+        let new_output = if self.max_memory.is_some() { Output::beside } else { Output::kept_beside };
+        let mut output = new_output(&self.output, &self.progress)?;
         let resources = match self.max_memory {
             Some(budget) => {
                 disk_space::check(&[(self.scratch_directory(), file_lengths(&self.inputs))])?;
@@ -187,9 +193,6 @@ impl<'a> FileBake<'a> {
             start = Instant::now();
         }
         let provenance = self.provenance(&checksums).to_text();
-        // Without a memory budget, the output stays in memory until it is proved, while a thread writes it.
-        let new_output = if self.max_memory.is_some() { Output::beside } else { Output::kept_beside };
-        let mut output = new_output(&self.output, &self.progress)?;
         let on_step = &mut self.on_step;
         let mut on_stage = |stage| on_step(Step::Bake(stage));
         let mut report = bake::bake(gatherer, &self.options, &provenance, &mut output, &mut on_stage)?;

@@ -4,7 +4,7 @@
 use super::byte_reader::ByteReader;
 use super::head::{HEAD_BYTES, misnamed};
 #[cfg(not(target_family = "wasm"))]
-use super::read_ahead::ReadAhead;
+use super::read_ahead::{BLOCK, ReadAhead};
 use super::warnings::Warnings;
 use super::{MeshFormat, UpAxis};
 use crate::error::{Halt, ReadError};
@@ -244,13 +244,13 @@ impl RandomAccess<'_> {
     }
 }
 
-/// Opens an input at its beginning, any number of times. Where there are threads, one of its own reads ahead.
+/// Opens an input at its beginning, any number of times. Where there are threads, one of its own reads ahead, unless there
+/// is only one block to read.
 pub(crate) struct Opener<'scope, 'env> {
     pub(crate) input: &'env InputFile<'env>,
     pub(crate) progress: &'env Progress,
     /// The checksum of all bytes, once a reader has come to the end.
     pub(crate) checksum: &'env OnceLock<u64>,
-    #[cfg_attr(target_family = "wasm", expect(dead_code, reason = "WebAssembly has no threads"))]
     pub(crate) scope: &'scope Scope<'scope, 'env>,
 }
 
@@ -260,8 +260,12 @@ impl<'scope, 'env> Opener<'scope, 'env> {
         let mut reader = self.input.reader(self.progress).map_err(Halt::Io)?;
         reader.checksum = Some((Hasher::default(), self.checksum));
         let length = reader.length;
-        #[cfg(not(target_family = "wasm"))]
-        let reader = ReadAhead::start(self.scope, reader);
+        let reader: Box<dyn Read + Send + 'scope> = if cfg!(target_family = "wasm") || length <= BLOCK as u64
+        {
+            Box::new(reader)
+        } else {
+            Box::new(ReadAhead::start(self.scope, reader))
+        };
         let mut reader = ByteReader::new(reader, length);
         match misnamed(reader.peek(HEAD_BYTES), length, Some(self.input.format)) {
             Some(fault) => Err(fault.into()),

@@ -9,7 +9,7 @@ use std::thread::Scope;
 /// The most blocks that wait to be read.
 const WAITING: usize = 4;
 /// The number of bytes in a block.
-const BLOCK: usize = 1 << 17;
+pub(crate) const BLOCK: usize = 1 << 17;
 
 /// The end of the stream from which bytes are read.
 pub(crate) struct ReadAhead {

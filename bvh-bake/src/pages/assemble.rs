@@ -212,7 +212,8 @@ impl Sections<'_> {
     }
 }
 
-/// The least number of bytes that are written and hashed at once, because each time waits for other threads.
+/// The least number of bytes that are written and hashed at once, and side by side, because each time waits for other
+/// threads.
 const MIN_WRITE_BYTES: usize = 1 << 18;
 
 /// The section that is being written.
@@ -243,7 +244,8 @@ impl OpenSection<'_> {
                 content.update(&bytes);
             }
         };
-        let hash = || threads::join(|| checksum.update(&bytes), hash_content);
-        threads::join(|| output.append(bytes.clone()), hash).0
+        let pays = bytes.len() >= MIN_WRITE_BYTES;
+        let hash = || threads::join_if(pays, || checksum.update(&bytes), hash_content);
+        threads::join_if(pays, || output.append(bytes.clone()), hash).0
     }
 }

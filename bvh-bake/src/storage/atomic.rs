@@ -13,6 +13,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// The name of scratch files until they are unlinked.
+pub(crate) const SCRATCH_NAME: &str = "cbvh-scratch";
+
 /// Replaces a file by `bytes` such that its name always refers either to the old content or to all of `bytes`. What is
 /// mapped or open under the old name keeps its content.
 ///
@@ -33,6 +36,7 @@ pub fn write_atomically_with(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), BakeError> {
     refuse_special(path)?;
+    remove_stale_beside(path);
     let mut temporary = Temporary::beside(path)?;
     write(&mut temporary.file).map_err(failed(path, "write"))?;
     temporary.rename(path)
@@ -93,10 +97,17 @@ fn kept(path: &Path) -> impl Fn(io::Error) -> BakeError {
     }
 }
 
-/// Removes the temporary files for `name` that killed processes left in a directory.
-pub(crate) fn remove_stale_of(directory: &Path, name: &OsStr) {
+/// Removes what killed processes left in the directory of an output: the temporary files for that output, and scratch
+/// files.
+pub(crate) fn remove_stale_beside(output: &Path) {
+    remove_stale(directory_of(output), &[output.file_name().unwrap_or_default(), SCRATCH_NAME.as_ref()]);
+}
+
+/// Removes the temporary files for any of the given names that killed processes left in a directory.
+pub(crate) fn remove_stale(directory: &Path, names: &[&OsStr]) {
     let Ok(entries) = fs::read_dir(directory) else { return };
-    for entry in entries.flatten().filter(|entry| is_temporary(&entry.file_name(), name)) {
+    let is_named = |file: &OsStr| names.iter().any(|name| is_temporary(file, name));
+    for entry in entries.flatten().filter(|entry| is_named(&entry.file_name())) {
         let path = entry.path();
         // Another process's file is opened only for this check, and a file that cannot be opened is left alone.
         if let Ok(file) = File::options().read(true).write(true).open(&path)
@@ -147,7 +158,6 @@ impl Temporary {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         // WebAssembly has no process ids. A name in use is never taken, and without locks no file counts as stale.
         let process = if cfg!(target_family = "wasm") { 0 } else { std::process::id() };
-        remove_stale_of(directory, name);
         loop {
             let number = COUNT.fetch_add(1, Ordering::Relaxed);
             let mut hidden = OsString::from(".");
@@ -253,7 +263,9 @@ mod tests {
         let others = [".out.cbvh.backup.tmp", ".other.cbvh.123-4.tmp", "out.cbvh.123-4.tmp"];
         write(stale);
         others.iter().for_each(|name| write(name));
+        remove_stale_beside(&output);
         let used = Temporary::beside(&output).unwrap();
+        remove_stale_beside(&output);
         let second = Temporary::beside(&output).unwrap();
         assert!(!directory.path().join(stale).exists() && used.path.exists() && second.path.exists());
         assert!(others.iter().all(|name| directory.path().join(name).exists()));

@@ -12,5 +12,5 @@ pub(crate) mod stored_file;
 mod stream;
 
 pub(crate) use scratch::{Piece, Scratch, Spill};
-pub(crate) use scratch_file::{read_exact_at, remove_stale, write_all_at};
+pub(crate) use scratch_file::{read_exact_at, write_all_at};
 pub(crate) use stream::Stream;

@@ -2,7 +2,7 @@
 //!
 //! If the bytes of the file fit in memory, a thread writes them and waits for the medium while the proof reads the
 //! bytes in memory. With a memory budget, the bytes are written at once, and the proof reads them back from the system
-//! while a thread waits for the medium.
+//! while a thread waits for the medium. A small file is proved faster than a thread is started, and goes without one.
 //!
 //! Neither way proves what the medium stores: until the system needs the memory, it returns the bytes that it was
 //! given.
@@ -20,6 +20,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
+
+/// The least number of bytes of a file for which a thread is started.
+const MIN_THREAD_BYTES: u64 = 1 << 20;
 
 /// Bytes that are written from the first to the last.
 pub(crate) enum Output {
@@ -51,7 +54,6 @@ impl Output {
         let mut output = Self::beside(path, progress)?;
         if let Self::File(file) = &mut output {
             file.kept = Some(Pieces::default());
-            file.writer = file.start_writer()?;
         }
         Ok(output)
     }
@@ -81,6 +83,7 @@ impl Output {
                 file.length += bytes.len() as u64;
                 if let Some(kept) = &mut file.kept {
                     kept.push(bytes.clone());
+                    file.start_writer()?;
                 }
                 file.write(at, bytes)?;
             }
@@ -98,11 +101,8 @@ impl Output {
                     kept.replace_first(&bytes);
                 }
                 file.write(0, bytes)?;
-                let writer = match file.writer.take() {
-                    None => file.start_writer()?,
-                    writer => writer,
-                };
-                file.writer = writer.map(Writer::closed);
+                file.start_writer()?;
+                file.writer = file.writer.take().map(Writer::closed);
             }
         }
         Ok(())
@@ -134,12 +134,16 @@ impl Output {
 }
 
 impl OutputFile {
-    /// Starts the thread that writes. Returns `None` where there are no threads; bytes are then written as they come.
-    fn start_writer(&self) -> Result<Option<Writer>, BakeError> {
-        match Writer::start(self.file.file()) {
-            Err(error) if error.kind() == io::ErrorKind::Unsupported => Ok(None),
-            started => started.map(Some).map_err(failed(&self.path, "create")),
+    /// Starts the thread that writes, unless it runs or the file is small. Where there are no threads, bytes are written as
+    /// they come.
+    fn start_writer(&mut self) -> Result<(), BakeError> {
+        if self.writer.is_none() && self.length >= MIN_THREAD_BYTES {
+            self.writer = match Writer::start(self.file.file()) {
+                Err(error) if error.kind() == io::ErrorKind::Unsupported => None,
+                started => Some(started.map_err(failed(&self.path, "create"))?),
+            };
         }
+        Ok(())
     }
 
     /// Writes bytes at an offset, or passes them to the writer thread.
@@ -291,8 +295,9 @@ mod tests {
     fn what_is_kept_is_what_is_written() {
         let directory = cbvh_testkit::folder();
         let path = directory.path().join("out");
-        let mut expected: Vec<u8> = (0..20_000u32).map(|i| ((i * i) >> 5) as u8).collect();
-        for keep in [false, true] {
+        for (keep, length) in [(false, 20_000), (true, 20_000), (false, 2 << 20), (true, 2 << 20)] {
+            let mut expected: Vec<u8> = (0..length).map(|i: u32| (i.wrapping_mul(i) >> 5) as u8).collect();
+            let length = expected.len();
             let progress = Progress::default();
             let new = if keep { Output::kept_beside } else { Output::beside };
             let mut output = new(&path, &progress).unwrap();
@@ -305,7 +310,7 @@ mod tests {
             let source = output.source();
             assert_eq!(source.length(), expected.len() as u64);
             for range in
-                [0..0, 0..777, 5..20, 776..778, 700..10_000, 19_999..20_000, 0..20_000, 20_000..20_000]
+                [0..0, 0..777, 5..20, 776..778, 700..10_000, length - 1..length, 0..length, length..length]
             {
                 assert_eq!(*source.read(range.clone()).unwrap(), expected[range]);
             }

@@ -2,16 +2,13 @@
 
 use crate::error::BakeError;
 use crate::progress::Progress;
-use crate::storage::atomic::{Temporary, remove_stale_of};
+use crate::storage::atomic::{SCRATCH_NAME, Temporary, remove_stale};
 use std::fs::File;
 use std::io;
 #[cfg(target_family = "wasm")]
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// The name of scratch files until they are unlinked.
-const NAME: &str = "cbvh-scratch";
 
 /// A scratch file.
 pub(crate) struct ScratchFile {
@@ -21,14 +18,10 @@ pub(crate) struct ScratchFile {
     progress: Progress,
 }
 
-/// Removes scratch files that still have their names, because a process was killed while it opened them.
-pub(crate) fn remove_stale(directory: &Path) {
-    remove_stale_of(directory, NAME.as_ref());
-}
-
 impl ScratchFile {
     pub(crate) fn create(directory: &Path, progress: &Progress) -> Result<Self, BakeError> {
-        let named = Temporary::named(directory, NAME.as_ref());
+        remove_stale(directory, &[SCRATCH_NAME.as_ref()]);
+        let named = Temporary::named(directory, SCRATCH_NAME.as_ref());
         let mut temporary =
             named.map_err(|source| failed(directory, "create scratch files in it", source))?;
         temporary.forget_name();

@@ -10,7 +10,7 @@ use wide::f32x4;
 /// The number of bins along each axis of a node's box.
 const BINS_PER_AXIS: usize = 16;
 /// A node of more triangles is split by several threads. With fewer, threads cost more time than they save.
-const MAX_SEQUENTIAL_TRIANGLES: usize = 8192;
+pub(super) const MAX_SEQUENTIAL_TRIANGLES: usize = 8192;
 /// The number of levels below which only medians are used, which bounds the depth of any tree.
 const MAX_COSTED_DEPTH: usize = 64;
 

@@ -207,7 +207,8 @@ impl Builder {
     /// Builds the tree by splits, before any subtree is moved.
     fn split_tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
         let none = || vec![Reference::NONE; triangles.len()];
-        let (mut references, mut scratch) = threads::join(none, none);
+        let pays = triangles.len() > binned::MAX_SEQUENTIAL_TRIANGLES;
+        let (mut references, mut scratch) = threads::join_if(pays, none, none);
         // On all threads: for a cloud, whose other steps are short, this is a fifth of the bake.
         threads::change(&mut references, |number, reference| {
             *reference = Reference::new(number as u32, &triangles[number].corners);

@@ -279,7 +279,10 @@ impl<'a> Stages<'a> {
         line.bytes_read += traffic.read() - before.read();
         line.bytes_written += traffic.written() - before.written();
         line.spilled_bytes += traffic.scratch_written - before.scratch_written;
-        (line.resident_bytes, line.peak_rss_bytes) = (process::current_bytes(), process::peak_bytes());
+        // The system takes longer to tell this than to bake a small mesh.
+        if self.screen.is_some_and(|screen| screen.tells_stages) {
+            (line.resident_bytes, line.peak_rss_bytes) = (process::current_bytes(), process::peak_bytes());
+        }
     }
 
     fn line(&self, step: Step) -> StageLine {

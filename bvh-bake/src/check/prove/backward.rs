@@ -7,6 +7,7 @@
 
 use super::InParallel;
 use crate::progress::{Progress, Stage, Step};
+use crate::threads;
 use bvh_format::bounds::{Inflation, Subtree, check_bounds, check_box};
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page, RootRef, check_named_link};
@@ -33,9 +34,12 @@ pub(crate) fn prove<S: Source>(source: &S, progress: &Progress) -> Result<(Layou
             let structure = Structure { topology: topology.get(number) };
             inflation.join(&prove_object(&layout, source, object, Some(structure), progress)?);
         }
-        Ok(inflation)
+        Ok::<_, S::Error>(inflation)
     };
-    let ((), inflation) = InParallel.both(|| check_sections(&layout, source), pages)?;
+    let pays = layout.page_count() > 1;
+    let (sections, inflation) = threads::join_if(pays, || check_sections(&layout, source), pages);
+    sections?;
+    let inflation = inflation?;
     Ok((layout, inflation))
 }
 
