@@ -4,7 +4,7 @@
 use super::corners::Corners;
 use super::{Backend, Isa, Lanes, Task};
 use crate::file::unpack::unpack;
-use crate::traverse::decode::{Parent, decode_group};
+use crate::traverse::decode::{Coding, Parent, decode_group};
 use bvh_format::leaf::{Packet, TriangleEncoding, decode_packet, encode_block};
 use bvh_format::page::decode::decode_child;
 use bvh_format::profile::Profile;
@@ -31,7 +31,7 @@ impl Task for Decode<'_> {
         let mut out = Group::ZERO;
         decode_group(
             isa,
-            (self.profile, self.scale),
+            Coding { profile: self.profile, f16_scale: self.scale },
             (self.treelet, self.part),
             Parent::Node(self.parent, self.column),
             &mut out,

@@ -5,7 +5,7 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
-use crate::traverse::open_child::{Opened, leaf_lanes, open_child, spread};
+use crate::traverse::open_child::{ClosedChild, Opened, leaf_lanes, open_child, spread};
 use bvh_format::object::Object;
 use bvh_format::slabs::{Group, NodeSlabs};
 use bvh_format::treelet::Links;
@@ -209,9 +209,15 @@ impl Task for DecodeNode<'_> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
         let Self { bvh, object, parent, child, to: [to, next, ..], infos } = self else { return Ok(1) };
-        let from = (&parent.group, child.child(), &parent.links, parent.page);
-        let (place, groups) = (parent.place(child), [&mut to.group, &mut next.group]);
-        let Some(opened) = open_child(isa, (bvh, object), from, place, groups)? else {
+        let closed = ClosedChild {
+            group: &parent.group,
+            column: child.child(),
+            links: &parent.links,
+            place: parent.place(child),
+            page: parent.page,
+        };
+        let groups = [&mut to.group, &mut next.group];
+        let Some(opened) = open_child(isa, (bvh, object), &closed, groups)? else {
             (to.continues, to.lanes) = (false, ChildLanes::NONE);
             return Ok(1);
         };

@@ -41,6 +41,14 @@ impl<V: Lanes> Unit<V> {
     }
 }
 
+/// How the treelets of an object code slabs.
+#[derive(Clone, Copy)]
+pub(crate) struct Coding {
+    pub(crate) profile: Profile,
+    /// The unit of slabs in `f16`.
+    pub(crate) f16_scale: f32,
+}
+
 /// Where the slabs of a treelet's parent are.
 #[derive(Clone, Copy)]
 pub(crate) enum Parent<'a> {
@@ -71,15 +79,15 @@ impl Parent<'_> {
 #[inline(always)]
 pub(crate) fn decode_group<I: Isa>(
     isa: I,
-    (profile, object_scale): (Profile, f32),
+    coding: Coding,
     (treelet, part): (&[u8], usize),
     parent: Parent<'_>,
     out: &mut Group,
 ) {
-    let scale = Unit::Fixed(isa.splat(object_scale));
+    let scale = Unit::Fixed(isa.splat(coding.f16_scale));
     let (u8_step, u4_step) = (Unit::Step(isa.splat(STEP_U8)), Unit::Step(isa.splat(STEP_U4)));
     let is_short = treelet.len() == SHORT_TREELET_BYTES;
-    match profile {
+    match coding.profile {
         Profile::Dop14U8 if is_short => {
             let t: &[u8; 32] = fixed(treelet, 0);
             quads!(isa, parent, out, 2, u8_step, |q| {

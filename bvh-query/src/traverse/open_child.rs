@@ -6,7 +6,7 @@ use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes};
-use crate::traverse::decode::{Parent, decode_group};
+use crate::traverse::decode::{Coding, Parent, decode_group};
 use bvh_format::kdop::DirectionSet;
 use bvh_format::object::Object;
 use bvh_format::page::{Page, RootRef, check_crossing, check_parent};
@@ -20,19 +20,30 @@ pub(super) struct Opened<'a> {
     pub(super) treelet: &'a [u8],
 }
 
-/// Decodes the slabs of the children of an inner child, given the slabs of four siblings and its column of them, the links of
-/// all siblings, their page, and its place among them. A leaf or an empty place has nothing to open.
+/// A child of an opened node.
+pub(super) struct ClosedChild<'a> {
+    /// The slabs of the child and of up to three siblings, and its column of them.
+    pub(super) group: &'a Group,
+    pub(super) column: usize,
+    /// The links of all siblings, and its place among them.
+    pub(super) links: &'a Links,
+    pub(super) place: usize,
+    /// The page of the node.
+    pub(super) page: u32,
+}
+
+/// Decodes the slabs of the children of an inner child. A leaf or an empty place has nothing to open.
 #[inline(always)]
 pub(super) fn open_child<'a, I: Isa>(
     isa: I,
     (bvh, object): (&'a Bvh, &Object),
-    (group, column, links, page): (&Group, usize, &Links, u32),
-    child: usize,
+    child: &ClosedChild<'_>,
     to: [&mut Group; 2],
 ) -> Result<Option<Opened<'a>>, QueryError> {
     let (at, slot, anchor);
+    let &ClosedChild { group, column, links, place, page } = child;
     let decoded = (group, column);
-    let parent = match links.child(child) {
+    let parent = match links.child(place) {
         Child::Treelet(place) => {
             at = bvh.page(object, page)?;
             slot = place;
@@ -52,7 +63,7 @@ pub(super) fn open_child<'a, I: Isa>(
     let treelet = at.treelet(slot);
     let links = Links::read(profile, treelet);
     for (part, to) in to.into_iter().enumerate().take(profile.groups()) {
-        let coding = (profile, object.f16_scale());
+        let coding = Coding { profile, f16_scale: object.f16_scale() };
         decode_group(isa, coding, (treelet, part), parent, to);
     }
     Ok(Some(Opened { links, page: at, treelet }))

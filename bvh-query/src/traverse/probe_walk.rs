@@ -20,7 +20,7 @@ use crate::file::place::LeafPacket;
 use crate::isa::{Isa, Lanes, Task};
 use crate::traverse::budget::Budget;
 use crate::traverse::node_cache::{max_nodes, too_many};
-use crate::traverse::open_child::{Opened, leaf_at, leaf_lanes, open_child, spread};
+use crate::traverse::open_child::{ClosedChild, Opened, leaf_at, leaf_lanes, open_child, spread};
 use bvh_format::object::Object;
 use bvh_format::slabs::Group;
 use bvh_format::treelet::Links;
@@ -73,9 +73,15 @@ impl OpenedNode {
         parent: &Self,
         child: usize,
     ) -> Result<bool, QueryError> {
-        let from = (&parent.groups[(child / 4) & 1], child % 4, &parent.links, parent.page);
+        let closed = ClosedChild {
+            group: &parent.groups[(child / 4) & 1],
+            column: child % 4,
+            links: &parent.links,
+            place: child,
+            page: parent.page,
+        };
         let Some(Opened { links, page, .. }) =
-            open_child(isa, (bvh, object), from, child, self.groups.each_mut())?
+            open_child(isa, (bvh, object), &closed, self.groups.each_mut())?
         else {
             return Ok(false);
         };

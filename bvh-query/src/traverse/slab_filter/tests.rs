@@ -4,7 +4,7 @@ use super::*;
 use crate::isa::{Backend, Task};
 use crate::numerics::POSE_ERROR;
 use crate::pose::Pose;
-use crate::traverse::decode::{Parent, decode_group};
+use crate::traverse::decode::{Coding, Parent, decode_group};
 use bvh_format::kdop::Kdop;
 use bvh_format::leaf::{Packet, TriangleEncoding};
 use bvh_format::page::{Page, PageShape, PageWriter, TightBound, WrittenPage};
@@ -245,7 +245,8 @@ impl Task for Run<'_> {
         for side in 0..2 {
             let page = Page::new(&self.nodes[side].page.bytes, PROFILE);
             let (mut parent, mut group) = (Group::of_one(&page.anchor_slabs(0)), Group::ZERO);
-            decode_group(isa, (PROFILE, 1.0), (page.treelet(0), 0), Parent::Node(&parent, 0), &mut group);
+            let coding = Coding { profile: PROFILE, f16_scale: 1.0 };
+            decode_group(isa, coding, (page.treelet(0), 0), Parent::Node(&parent, 0), &mut group);
             parent = group;
             let codes = TurningCodes::read(page.treelet(0).first_chunk().expect("128 bytes"));
             decoded[side].decode(isa, &codes, &parent);
