@@ -208,7 +208,9 @@ impl Task for DecodeNode<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        let Self { bvh, object, parent, child, to: [to, next, ..], infos } = self else { return Ok(1) };
+        let Self { bvh, object, parent, child, to: [to, next, ..], infos } = self else {
+            unreachable!("there is room for two numbers")
+        };
         let closed = ClosedChild {
             group: &parent.group,
             column: child.child(),

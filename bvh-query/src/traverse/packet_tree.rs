@@ -143,7 +143,6 @@ fn put(level: &mut Vec<Boxes>, place: usize, of: &Boxes) {
     if place.is_multiple_of(4) {
         level.push(Boxes::EMPTY);
     }
-    if let Some(boxes) = level.last_mut() {
-        boxes.put(place, of);
-    }
+    let Some(boxes) = level.last_mut() else { unreachable!("the first place makes four") };
+    boxes.put(place, of);
 }
