@@ -3,7 +3,6 @@
 
 use super::byte_reader::ByteReader;
 use super::head::{HEAD_BYTES, misnamed};
-#[cfg(not(target_family = "wasm"))]
 use super::read_ahead::{BLOCK, ReadAhead};
 use super::warnings::Warnings;
 use super::{MeshFormat, UpAxis};

@@ -26,7 +26,6 @@ mod obj;
 mod pcd;
 mod ply;
 pub(crate) mod polygon;
-#[cfg(not(target_family = "wasm"))]
 mod read_ahead;
 mod stl;
 mod text;
