@@ -117,11 +117,14 @@ pub struct PackedHead {
     pub pool_at: u32,
 }
 
-/// The first bit of a byte of a block. A head that was not checked may state any byte. Beyond the largest block, all bytes read as
-/// zero, and places in bits fit into 32.
+/// More bytes than a block has: at most 2^16 vertices of 12 bytes, as many slots of 2, and the records.
+const BEYOND_ANY_BLOCK: u32 = 1 << 28;
+
+/// Returns the bit at which a byte of the block starts. A head that was not checked may state any byte. All bytes beyond the block
+/// read as zero, so any of them may stand for the others; then bits can be counted in a `usize` of 32 bits, too.
 #[inline(always)]
 fn first_bit(byte: u32) -> usize {
-    byte.min(1 << 28) as usize * 8
+    byte.min(BEYOND_ANY_BLOCK) as usize * 8
 }
 
 impl PackedHead {
