@@ -71,7 +71,8 @@ impl Read for ReadAhead {
     }
 }
 
-#[cfg(test)]
+// WebAssembly has no threads.
+#[cfg(all(test, not(target_family = "wasm")))]
 mod tests {
     use super::*;
     use std::io::BufReader;

@@ -6,7 +6,7 @@ pub(crate) mod sheet;
 pub(crate) use cbvh_testkit::skip;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// A folder for the files of one test, which is removed at its end.
@@ -84,13 +84,23 @@ pub(crate) fn cbvh_with_isa(directory: &Path, isa: &str, arguments: &[&str]) -> 
     run(Command::new(env!("CARGO_BIN_EXE_cbvh")).args(arguments).current_dir(directory).env("CBVH_ISA", isa))
 }
 
+/// Starts a command. Under Wine, a process now and then ends before it runs any code of its own, with the error
+/// `ERROR_INTERNAL_ERROR` for its parent, which no program of this project can cause. It is then started again, once.
+fn spawn(command: &mut Command) -> std::io::Result<Child> {
+    const INTERNAL_ERROR: i32 = 1359;
+    match command.spawn() {
+        Err(error) if cfg!(windows) && error.raw_os_error() == Some(INTERNAL_ERROR) => command.spawn(),
+        started => started,
+    }
+}
+
 /// Runs a command to its end.
 pub(crate) fn run(command: &mut Command) -> Ended {
     // Output goes to files, because a full pipe would stop the command.
     let directory = tempfile::tempdir().unwrap();
     let paths = ["out", "err"].map(|name| directory.path().join(name));
     let [out, err] = paths.each_ref().map(|path| std::fs::File::create(path).unwrap());
-    let mut child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn().unwrap();
+    let mut child = spawn(command.stdin(Stdio::null()).stdout(out).stderr(err)).unwrap();
     let start = Instant::now();
     let status = loop {
         if let Some(status) = child.try_wait().unwrap() {
