@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const CRATES: [&str; 9] = [
     "bvh-format/src",
     "bvh-bake/src",
-    "bvh-bake/cli/src",
+    "bvh-query/cli/src",
     "bvh-query/src",
     "bvh-query/robot/src",
     "bvh-query/view/src",
