@@ -133,7 +133,7 @@ pub(crate) fn penetration<'py>(
     let (options, budget) = (depth_options(relative_gap, tolerance)?, limit(budget, "budget")? as u64);
     let found = question.ask(
         |batch, poses| {
-            let mut batch = *batch;
+            let mut batch = batch.clone();
             batch.set_budget(budget);
             batch.penetrations(poses, &options)
         },

@@ -1,12 +1,9 @@
 //! Asks about many poses of one pair of meshes, on all cores.
 //!
-//! Poses are cut into runs. Each thread takes the next run; it has one querier for all of its runs, and a fresh tracker
-//! for each run. The cut depends only on the number of poses. A query therefore reads the same pages, and meets the
-//! same errors, on any number of threads. Answers do not depend on the cut.
+//! Poses are cut into runs, each with a fresh tracker. The cut depends only on the number of poses. A query therefore reads
+//! the same pages, and meets the same errors, on any number of threads. Answers do not depend on the cut.
 //!
 //! A batch ends at the first pose, in their order, that ends it: by an error, or by the contact that was looked for.
-//! Runs are taken in order, and a run is left out only if it lies behind a known end. Every pose before the first end
-//! is therefore tested, and only the last few runs can be wasted work.
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
@@ -20,18 +17,18 @@ use crate::query::distance::Distance;
 use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
 use crate::query::patches::{PatchOptions, Patches};
+use crate::query::pool::Pool;
 use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 use crate::query::regions::ContactRegions;
 use crate::query::tracker::Tracker;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Asks about many poses or motions of one pair of meshes, on all threads of the rayon pool it is called in.
 ///
 /// The answers are those of [`Querier`], bit for bit and in the order of the poses, on any number of threads.
 /// Neighbouring poses share a [`Tracker`], so give the poses of a path in the order of the path. Other poses cost as
-/// much as one by one. A batch needs the memory of one querier per thread, and of the answers.
+/// much as one by one. A batch needs the memory of one querier per thread, which it keeps for the next call, and of the
+/// answers.
 ///
 /// # Errors
 /// Each method returns the error of the first pose, in their order, that has no answer: because a page that its query
@@ -52,12 +49,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Batch<'a> {
     a: Shape<'a>,
     b: Shape<'a>,
-    backend: Backend,
-    budget: u64,
+    pool: Pool,
 }
 
 /// The most poses in a run. Longer runs gain nothing that can be measured.
@@ -77,12 +73,12 @@ impl<'a> Batch<'a> {
 
     /// Creates a batch with a backend. The portable backend replaces one that the CPU lacks.
     pub fn with_backend(a: impl Into<Shape<'a>>, b: impl Into<Shape<'a>>, backend: Backend) -> Self {
-        Self { a: a.into(), b: b.into(), backend, budget: u64::MAX }
+        Self { a: a.into(), b: b.into(), pool: Pool::new(backend) }
     }
 
     /// Bounds the work per pose, as [`Querier::set_budget`] does.
     pub fn set_budget(&mut self, visits: u64) {
-        self.budget = visits;
+        self.pool.budget = visits;
     }
 
     /// Answers [`Querier::collide`] for each pose.
@@ -238,73 +234,19 @@ impl<'a> Batch<'a> {
         ask: impl Fn(&mut Querier, &mut Tracker, &P) -> Result<T, E> + Sync,
     ) -> Result<Vec<T>, (usize, E)> {
         let length = (poses.len() / MIN_RUNS_PER_BATCH).clamp(1, MAX_POSES_PER_RUN);
-        let runs = poses.len().div_ceil(length);
-        let shared = Shared { next: AtomicUsize::new(0), end: AtomicUsize::new(usize::MAX) };
-        let threads = rayon::current_num_threads().min(runs);
-        let share = |_| {
-            let mut querier = Querier::with_backend(self.backend);
-            querier.set_budget(self.budget);
-            let mut share = ThreadShare { answers: Vec::new(), end: None };
-            while let Some(start) = shared.take(length, poses.len()) {
+        let mut answers = Vec::with_capacity(poses.len());
+        self.pool.runs(
+            rayon::current_num_threads(),
+            poses.len(),
+            length,
+            |querier, numbers| {
                 let mut tracker = Tracker::new();
-                for (index, pose) in poses.iter().enumerate().skip(start).take(length) {
-                    if !shared.is_needed(index) {
-                        break;
-                    }
-                    match ask(&mut querier, &mut tracker, pose) {
-                        Ok(answer) => share.answers.push((index, answer)),
-                        Err(end) => {
-                            shared.end_at(index);
-                            share.end = Some((index, end));
-                            // The next runs are behind this pose.
-                            return share;
-                        }
-                    }
-                }
-            }
-            share
-        };
-        let shares: Vec<_> = (0..threads).into_par_iter().with_max_len(1).map(share).collect();
-        let mut answers: Vec<Option<T>> = poses.iter().map(|_| None).collect();
-        let mut ends = Vec::new();
-        for share in shares {
-            share.answers.into_iter().for_each(|(index, answer)| answers[index] = Some(answer));
-            ends.extend(share.end);
-        }
-        match ends.into_iter().min_by_key(|(index, _)| *index) {
-            Some(end) => Err(end),
-            None => Ok(answers.into_iter().flatten().collect()),
-        }
-    }
-}
-
-/// What one thread has done.
-struct ThreadShare<T, E> {
-    answers: Vec<(usize, T)>,
-    end: Option<(usize, E)>,
-}
-
-/// What threads know of each other. The numbers do not depend on each other, so that relaxed accesses suffice.
-struct Shared {
-    /// The next run to take.
-    next: AtomicUsize,
-    /// The first pose known to end the batch.
-    end: AtomicUsize,
-}
-
-impl Shared {
-    /// Returns the first pose of the next run of `length`, if a run is left that is needed.
-    fn take(&self, length: usize, poses: usize) -> Option<usize> {
-        let start = self.next.fetch_add(1, Ordering::Relaxed).checked_mul(length)?;
-        (start < poses && self.is_needed(start)).then_some(start)
-    }
-
-    /// Returns whether no end before the pose is known.
-    fn is_needed(&self, index: usize) -> bool {
-        index < self.end.load(Ordering::Relaxed)
-    }
-
-    fn end_at(&self, index: usize) {
-        self.end.fetch_min(index, Ordering::Relaxed);
+                let answers = numbers
+                    .map(|number| ask(querier, &mut tracker, &poses[number]).map_err(|end| (number, end)));
+                answers.collect::<Result<Vec<T>, _>>()
+            },
+            |of_run| answers.extend(of_run),
+        )?;
+        Ok(answers)
     }
 }

@@ -16,6 +16,7 @@ pub(crate) mod options;
 mod pair_search;
 pub(crate) mod patches;
 mod placed_pair;
+pub(crate) mod pool;
 pub(crate) mod probe;
 pub(crate) mod querier;
 pub(crate) mod regions;

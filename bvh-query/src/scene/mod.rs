@@ -246,7 +246,7 @@ impl Scene {
     /// answer needs all pairs, the number of threads does not affect whether the visits suffice. It does affect which
     /// pair the error names, and t threads may make t times as many visits before they stop.
     pub fn set_budget(&mut self, visits: u64) {
-        self.workers.budget = visits;
+        self.workers.pool.budget = visits;
     }
 
     /// Adds an instance. It is in all groups, and no other instance is allowed to touch it.

@@ -1,10 +1,11 @@
 //! Asks about many points, rays or segments and one mesh, on all cores.
 //!
 //! Probes are sorted along a space-filling curve, so that the next probe finds in the caches what the last one needed.
-//! Each thread takes runs of them. Answers are in the order of the probes, and do not depend on the number of threads.
+//! Answers are in the order of the probes, and do not depend on the number of threads.
 
 use crate::error::QueryError;
 use crate::isa::{Backend, BackendError};
+use crate::query::pool::Pool;
 use crate::query::probe::closest::ClosestPoint;
 use crate::query::probe::closest::check_within;
 use crate::query::probe::placed::PlacedShape;
@@ -12,7 +13,7 @@ use crate::query::probe::ray::Ray;
 use crate::query::probe::ray::RayHit;
 use crate::query::probe::side::{Side, SignedDistance};
 use crate::query::querier::Querier;
-use rayon::prelude::*;
+use std::convert::Infallible;
 
 /// Probes in a run of one thread.
 const PROBES_PER_RUN: usize = 256;
@@ -20,15 +21,14 @@ const PROBES_PER_RUN: usize = 256;
 /// Asks about many points, rays or segments and one mesh, on all threads of the rayon pool it is called in.
 ///
 /// The answers are those of [`Querier`], bit for bit and in the order of the probes. A batch needs the memory of one querier
-/// per thread, of the answers, and 16 bytes per probe.
+/// per thread, which it keeps for the next call, of the answers, and 16 bytes per probe.
 ///
 /// # Errors
 /// Each method returns the error of the first probe, in their order, that has no answer.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct ProbeBatch<'a> {
     shape: PlacedShape<'a>,
-    backend: Backend,
-    budget: u64,
+    pool: Pool,
 }
 
 impl<'a> ProbeBatch<'a> {
@@ -43,12 +43,12 @@ impl<'a> ProbeBatch<'a> {
 
     /// Creates a batch with a backend. The portable backend replaces one that the CPU lacks.
     pub fn with_backend(shape: impl Into<PlacedShape<'a>>, backend: Backend) -> Self {
-        Self { shape: shape.into(), backend, budget: u64::MAX }
+        Self { shape: shape.into(), pool: Pool::new(backend) }
     }
 
     /// Bounds the work per probe, as [`Querier::set_budget`] does.
     pub fn set_budget(&mut self, visits: u64) {
-        self.budget = visits;
+        self.pool.budget = visits;
     }
 
     /// Answers [`Querier::closest_point`] for each point.
@@ -130,17 +130,23 @@ impl<'a> ProbeBatch<'a> {
         ask: impl Fn(&mut Querier, &P) -> Result<R, QueryError> + Sync,
     ) -> Result<Vec<R>, QueryError> {
         let order = along_curve(&probes.iter().map(at).collect::<Vec<_>>());
-        let ask_run = |querier: &mut Querier, run: &[u32]| -> Vec<Result<R, QueryError>> {
-            querier.set_budget(self.budget);
-            run.iter().map(|&number| ask(querier, &probes[number as usize])).collect()
-        };
-        let runs = order.par_chunks(PROBES_PER_RUN);
-        let runs: Vec<Vec<Result<R, QueryError>>> =
-            runs.map_init(|| Querier::with_backend(self.backend), ask_run).collect();
         let mut answers: Vec<Option<Result<R, QueryError>>> = probes.iter().map(|_| None).collect();
-        for (&number, answer) in order.iter().zip(runs.into_iter().flatten()) {
-            answers[number as usize] = Some(answer);
-        }
+        let mut numbers = order.iter();
+        // An error ends no run, because a probe that comes later along the curve may be the first that fails.
+        let Ok(()) = self.pool.runs(
+            rayon::current_num_threads(),
+            order.len(),
+            PROBES_PER_RUN,
+            |querier, places| {
+                let of_run = places.map(|place| ask(querier, &probes[order[place] as usize]));
+                Ok::<_, (usize, Infallible)>(of_run.collect::<Vec<_>>())
+            },
+            |of_run| {
+                for (&number, answer) in numbers.by_ref().zip(of_run) {
+                    answers[number as usize] = Some(answer);
+                }
+            },
+        );
         answers.into_iter().flatten().collect()
     }
 }
