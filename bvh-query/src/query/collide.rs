@@ -65,21 +65,30 @@ impl Querier {
         if surely_apart(&placed.pair) {
             return Ok(None);
         }
+        self.walk_contacts(placed, Order::Nearest, FIRST_DRAIN, &mut |pair| Ok(ControlFlow::Break(pair)))
+    }
+
+    /// Passes the pairs of triangles of two objects that are in contact to `visit`, until it breaks, and returns what it broke
+    /// with. The first `drain_at` candidates are decided together.
+    pub(super) fn walk_contacts(
+        &mut self,
+        placed: &PlacedPair<'_>,
+        order: Order,
+        drain_at: usize,
+        visit: VisitPair<'_>,
+    ) -> Result<Option<TrianglePair>, QueryError> {
         self.queue.clear();
         self.start_placed();
-        let mut visitor = ContactVisitor {
-            packets: &mut self.packets,
-            order: Order::Nearest,
-            candidates: Candidates {
-                placed,
-                queue: &mut self.queue,
-                drain_at: FIRST_DRAIN,
-                stats: QueryStats::default(),
-                recent: &mut self.recent,
-                visit: &mut |candidate| Ok(ControlFlow::Break(candidate)),
-                found: None,
-            },
+        let candidates = Candidates {
+            placed,
+            queue: &mut self.queue,
+            drain_at,
+            stats: QueryStats::default(),
+            recent: &mut self.recent,
+            visit,
+            found: None,
         };
+        let mut visitor = ContactVisitor { packets: &mut self.packets, order, candidates };
         let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
         let tests = self.backend.run(task)?;
         let Candidates { found, stats, .. } = visitor.candidates;

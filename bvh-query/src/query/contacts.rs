@@ -6,13 +6,11 @@ use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::numerics::round_up;
 use crate::pose::Pose;
 use crate::query::bounding_volumes::{sphere_gap, surely_apart};
-use crate::query::collide::{Candidates, ContactVisitor};
 use crate::query::options::DistanceOptions;
-use crate::query::pair_search::{EachWithin, Finalists, NearestPairs, PairSearch, ids};
-use crate::query::placed_pair::{PlacedPair, Walk, each_pair};
+use crate::query::pair_search::{PairSearch, ids};
+use crate::query::placed_pair::{PlacedPair, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::sum_of_radii;
-use crate::query::stats::QueryStats;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::walk::Order;
 use bvh_format::header::SectionKind;
@@ -120,9 +118,6 @@ impl Querier {
         if apart {
             return Ok(None);
         }
-        self.queue.clear();
-        self.bounded.clear();
-        self.start_placed();
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
         let budget = self.memory.budget;
         let mut contacts = 0;
@@ -134,33 +129,12 @@ impl Querier {
             Ok(visit(contact, pair))
         };
         let visit = &mut |candidate| report(placed, candidate, &mut count);
-        let (pair, memory, packets, queue) =
-            (&placed.pair, &mut self.memory, &mut self.packets, &mut self.queue);
-        let (tests, stats, found) = if within == 0.0 {
-            let candidates = Candidates {
-                placed,
-                queue,
-                drain_at: TriangleQueue::FULL,
-                stats: QueryStats::default(),
-                recent: &mut self.recent,
-                visit,
-                found: None,
-            };
-            let mut visitor = ContactVisitor { packets, order: Order::Any, candidates };
-            let tests = self.backend.run(&mut Walk { pair, memory, visitor: &mut visitor })?;
-            (tests, visitor.candidates.stats, visitor.candidates.found)
+        let found = if within == 0.0 {
+            self.walk_contacts(placed, Order::Any, TriangleQueue::FULL, visit)?
         } else {
-            let (search, bounded) =
-                (&mut PairSearch::new(DistanceOptions::default(), within), &mut self.bounded);
-            let each_within = Some(EachWithin { d: within, visit, found: None });
-            let stats = QueryStats::default();
-            let finalists = Finalists { placed, direction: None, search, each_within, queue, bounded, stats };
-            let mut visitor = NearestPairs { packets, finalists };
-            let tests = self.backend.run(&mut Walk { pair, memory, visitor: &mut visitor })?;
-            let Finalists { stats, each_within, .. } = visitor.finalists;
-            (tests, stats, each_within.and_then(|each| each.found))
+            let search = &mut PairSearch::new(DistanceOptions::default(), within);
+            self.walk_nearest(placed, search, Some((within, visit)))?
         };
-        self.stats.add(tests, stats);
         self.memory.budget.charge(contacts)?;
         Ok(found)
     }

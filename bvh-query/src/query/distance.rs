@@ -9,8 +9,8 @@ use crate::pose::Pose;
 use crate::query::bounding_volumes::sphere_gap;
 use crate::query::exact::TriangleDistance;
 use crate::query::options::{DistanceOptions, check_distance};
-use crate::query::pair_search::{BestPair, Finalists, NearestPairs, PairSearch, ids};
-use crate::query::placed_pair::{FoundPair, PlacedPair, Walk, each_pair};
+use crate::query::pair_search::{BestPair, EachWithin, Finalists, NearestPairs, PairSearch, ids};
+use crate::query::placed_pair::{FoundPair, PlacedPair, VisitPair, Walk, each_pair};
 use crate::query::querier::Querier;
 use crate::query::rounded::{between, limit_of_cores, sum_of_radii};
 use crate::query::stats::QueryStats;
@@ -235,26 +235,38 @@ impl Querier {
             if gap > f64::from(search.limit()) {
                 return Ok(None);
             }
-            self.queue.clear();
-            self.start_placed();
-            self.bounded.clear();
-            let finalists = Finalists {
-                placed,
-                direction: search.direction(),
-                search,
-                each_within: None,
-                queue: &mut self.queue,
-                bounded: &mut self.bounded,
-                stats: QueryStats::default(),
-            };
-            let mut visitor = NearestPairs { packets: &mut self.packets, finalists };
-            let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
-            let tests = self.backend.run(task)?;
-            let stats = visitor.finalists.stats;
-            self.stats.add(tests, stats);
+            self.walk_nearest(placed, search, None)?;
             Ok(search.done.then_some(()))
         })?;
         Ok(())
+    }
+
+    /// Looks for the closest pair of triangles of two objects within the limit of `search`. With a distance and a visitor, it
+    /// passes on each pair within the distance instead, and returns what the visitor broke with.
+    pub(super) fn walk_nearest(
+        &mut self,
+        placed: &PlacedPair<'_>,
+        search: &mut PairSearch,
+        each_within: Option<(f64, VisitPair<'_>)>,
+    ) -> Result<Option<TrianglePair>, QueryError> {
+        self.queue.clear();
+        self.start_placed();
+        self.bounded.clear();
+        let finalists = Finalists {
+            placed,
+            direction: search.direction(),
+            search,
+            each_within: each_within.map(|(d, visit)| EachWithin { d, visit, found: None }),
+            queue: &mut self.queue,
+            bounded: &mut self.bounded,
+            stats: QueryStats::default(),
+        };
+        let mut visitor = NearestPairs { packets: &mut self.packets, finalists };
+        let task = &mut Walk { pair: &placed.pair, memory: &mut self.memory, visitor: &mut visitor };
+        let tests = self.backend.run(task)?;
+        let Finalists { stats, each_within, .. } = visitor.finalists;
+        self.stats.add(tests, stats);
+        Ok(each_within.and_then(|each| each.found))
     }
 
     /// Returns the answer for touching meshes: the first contact that a walk meets, the same on every backend.
