@@ -2,43 +2,65 @@
 
 use crate::error::{NumberError, QueryError};
 
-/// How exact a distance has to be. By default it is exact.
-///
-/// ```
-/// use bvh_query::DistanceOptions;
-///
-/// let within_a_percent = DistanceOptions::new().rel_err(0.01);
-/// assert_eq!(within_a_percent.abs_err, 0.0);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[non_exhaustive]
-pub struct DistanceOptions {
-    /// The answer may exceed the least distance by this fraction of it.
-    pub rel_err: f64,
-    /// The answer may exceed the least distance by this length as well, in mesh units.
-    pub abs_err: f64,
+/// Defines the options of a question: a struct with public fields, their defaults, and for each field a method that sets it.
+/// `name(given): kept = default` is a field that is set by a value of the type `given`.
+macro_rules! options {
+    (
+        $(#[$about:meta])*
+        pub struct $options:ident {
+            $($(#[$doc:meta])* $name:ident($given:ty): $kept:ty = $default:expr,)*
+        }
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[non_exhaustive]
+        pub struct $options {
+            $($(#[$doc])* pub $name: $kept,)*
+        }
+
+        impl Default for $options {
+            fn default() -> Self {
+                Self { $($name: $default,)* }
+            }
+        }
+
+        impl $options {
+            /// Returns the defaults.
+            pub fn new() -> Self {
+                Self::default()
+            }
+
+            $($(#[$doc])*
+            #[must_use]
+            pub fn $name(self, $name: $given) -> Self {
+                Self { $name: $name.into(), ..self }
+            })*
+        }
+    };
+}
+
+pub(crate) use options;
+
+options! {
+    /// How exact a distance has to be. By default it is exact.
+    ///
+    /// ```
+    /// use bvh_query::DistanceOptions;
+    ///
+    /// let within_a_percent = DistanceOptions::new().rel_err(0.01);
+    /// assert_eq!(within_a_percent.abs_err, 0.0);
+    /// ```
+    pub struct DistanceOptions {
+        /// The answer may exceed the least distance by this fraction of it. A query refuses a fraction that is negative or not
+        /// finite.
+        rel_err(f64): f64 = 0.0,
+        /// The answer may exceed the least distance by this length as well, in mesh units. A query refuses a length that is
+        /// negative or not finite.
+        abs_err(f64): f64 = 0.0,
+    }
 }
 
 impl DistanceOptions {
-    /// Asks for the exact distance.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Lets the answer exceed the least distance by this fraction of it. A query refuses a fraction that is negative or
-    /// not finite.
-    #[must_use]
-    pub fn rel_err(self, rel_err: f64) -> Self {
-        Self { rel_err, ..self }
-    }
-
-    /// Lets the answer exceed the least distance by this length, in mesh units. A query refuses a length that is
-    /// negative or not finite.
-    #[must_use]
-    pub fn abs_err(self, abs_err: f64) -> Self {
-        Self { abs_err, ..self }
-    }
-
     /// Refuses invalid errors.
     pub(super) fn check(&self) -> Result<(), QueryError> {
         check(NumberError::RelErr, self.rel_err)?;

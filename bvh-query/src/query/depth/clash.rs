@@ -8,7 +8,7 @@ use crate::query::depth::penetration::{Penetration, PenetrationOptions};
 use crate::query::displacement::{displacement, size};
 use crate::query::distance::Distance;
 use crate::query::exact::{placed, stored_at};
-use crate::query::options::check;
+use crate::query::options::{check, options};
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
@@ -77,59 +77,24 @@ pub struct Clash {
     pub point: [f64; 3],
 }
 
-/// What counts as a clash.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct ClashOptions {
-    /// Parts at most this far apart are near, in mesh units. 0, the default, looks for no near parts.
-    pub clearance: f64,
-    /// Parts at most this far apart, or at most this deep in each other, are touching, in mesh units. `None`, the default, stands
-    /// for a millionth of the largest side of both parts.
-    pub tolerance: Option<f64>,
-    /// The search for a depth ends when its bounds are this near each other, as a part of the lower one.
-    pub relative_gap: f64,
-    /// The most visits of the search for the depth of a pair: see [`Querier::set_budget`], whose budget limits it, too.
-    pub visits: u64,
-}
-
-impl Default for ClashOptions {
-    fn default() -> Self {
-        Self { clearance: 0.0, tolerance: None, relative_gap: 0.1, visits: 1 << 20 }
+options! {
+    /// What counts as a clash.
+    pub struct ClashOptions {
+        /// Parts at most this far apart are near, in mesh units. 0, the default, looks for no near parts. A query refuses a
+        /// clearance that is negative or not finite.
+        clearance(f64): f64 = 0.0,
+        /// Parts at most this far apart, or at most this deep in each other, are touching, in mesh units. `None`, the default,
+        /// stands for a millionth of the largest side of both parts. A query refuses a length that is negative or not finite.
+        tolerance(f64): Option<f64> = None,
+        /// The search for a depth ends when its bounds are this near each other, as a part of the lower one. A query refuses a part
+        /// that is not above 0 or not finite.
+        relative_gap(f64): f64 = 0.1,
+        /// The most visits of the search for the depth of a pair: see [`Querier::set_budget`], whose budget limits it, too.
+        visits(u64): u64 = 1 << 20,
     }
 }
 
 impl ClashOptions {
-    /// Looks for parts that touch, overlap or contain each other.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Looks for parts that are near each other, too. A query refuses a clearance that is negative or not finite.
-    #[must_use]
-    pub fn clearance(self, clearance: f64) -> Self {
-        Self { clearance, ..self }
-    }
-
-    /// Takes parts for touching if they are no farther apart and no deeper in each other than a length. A query refuses one that
-    /// is negative or not finite.
-    #[must_use]
-    pub fn tolerance(self, tolerance: f64) -> Self {
-        Self { tolerance: Some(tolerance), ..self }
-    }
-
-    /// Ends the search for a depth when its bounds are this near each other. A query refuses a part that is not above 0 or not
-    /// finite.
-    #[must_use]
-    pub fn relative_gap(self, relative_gap: f64) -> Self {
-        Self { relative_gap, ..self }
-    }
-
-    /// Limits the search for the depth of a pair.
-    #[must_use]
-    pub fn visits(self, visits: u64) -> Self {
-        Self { visits, ..self }
-    }
-
     pub(crate) fn check(&self) -> Result<(), QueryError> {
         check(NumberError::Clearance, self.clearance)?;
         PenetrationOptions::new().relative_gap(self.relative_gap).check()?;

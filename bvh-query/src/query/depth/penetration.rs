@@ -13,7 +13,7 @@ use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
 use crate::query::depth::free::{Free, LastContact};
 use crate::query::depth::planes::{Plane, shortest_beyond};
 use crate::query::depth::translation::{Translation, moved};
-use crate::query::options::check;
+use crate::query::options::{check, options};
 use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 use bvh_format::kdop::FACTORS;
@@ -49,49 +49,27 @@ pub struct Penetration {
     pub is_spent: bool,
 }
 
-/// When the search for a depth ends.
-///
-/// ```
-/// use bvh_query::PenetrationOptions;
-///
-/// let is_it_deeper_than_a_tenth = PenetrationOptions::new().tolerance(0.1);
-/// assert_eq!(is_it_deeper_than_a_tenth.relative_gap, 0.01);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct PenetrationOptions {
-    /// It ends when the upper bound exceeds the lower one by no more than this part of it.
-    pub relative_gap: f64,
-    /// It ends when it is known whether the depth exceeds this length, in mesh units.
-    pub tolerance: Option<f64>,
-}
-
-impl Default for PenetrationOptions {
-    fn default() -> Self {
-        Self { relative_gap: 0.01, tolerance: None }
+options! {
+    /// When the search for a depth ends. By default it does when the bounds are within one per cent, or when it has tried all it
+    /// knows.
+    ///
+    /// ```
+    /// use bvh_query::PenetrationOptions;
+    ///
+    /// let is_it_deeper_than_a_tenth = PenetrationOptions::new().tolerance(0.1);
+    /// assert_eq!(is_it_deeper_than_a_tenth.relative_gap, 0.01);
+    /// ```
+    pub struct PenetrationOptions {
+        /// It ends when the upper bound exceeds the lower one by no more than this part of it. A query refuses a part that is not
+        /// above 0 or not finite.
+        relative_gap(f64): f64 = 0.01,
+        /// It ends when it is known whether the depth exceeds this length, in mesh units. A query refuses a length that is negative
+        /// or not finite.
+        tolerance(f64): Option<f64> = None,
     }
 }
 
 impl PenetrationOptions {
-    /// Ends the search when the bounds are within one per cent, or when it has tried all it knows.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Ends the search when the upper bound exceeds the lower one by no more than this part of it. A query refuses a part that
-    /// is not above 0 or not finite.
-    #[must_use]
-    pub fn relative_gap(self, relative_gap: f64) -> Self {
-        Self { relative_gap, ..self }
-    }
-
-    /// Ends the search when it is known whether the depth exceeds a length, in mesh units. A query refuses a length that is
-    /// negative or not finite.
-    #[must_use]
-    pub fn tolerance(self, tolerance: f64) -> Self {
-        Self { tolerance: Some(tolerance), ..self }
-    }
-
     pub(crate) fn check(&self) -> Result<(), QueryError> {
         check(NumberError::RelativeGap, self.relative_gap)?;
         if self.relative_gap == 0.0 {

@@ -34,43 +34,27 @@ use crate::file::shape::Shape;
 use crate::motion::RigidPath;
 use crate::pose::Pose;
 use crate::query::distance::Distance;
-use crate::query::options::{DistanceOptions, check};
+use crate::query::options::{DistanceOptions, check, options};
 use crate::query::pair_search::PairSearch;
 use crate::query::querier::Querier;
 use cells::{Outcome, TimeSearch};
 use limits::Question;
 
-/// What counts as a hit, and how exactly time is searched.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[non_exhaustive]
-pub struct MotionOptions {
-    /// Meshes that are at most this far apart count as a hit, in mesh units; 0 for contact.
-    pub clearance: f64,
-    /// The width of the undecided range beyond the clearance, in mesh units. If B comes that near and is no hit, the
-    /// answer may be [`MotionAnswer::Near`]. `None` stands for the default, which
-    /// [`MotionOptions::tolerance_between`] gives: a millionth of the diagonal of the smaller object's box. A smaller
-    /// tolerance costs more.
-    pub tolerance: Option<f64>,
+options! {
+    /// What counts as a hit, and how exactly time is searched. By default contact does.
+    pub struct MotionOptions {
+        /// Meshes that are at most this far apart count as a hit, in mesh units; 0 for contact. A query refuses a length that is
+        /// negative or not finite.
+        clearance(f64): f64 = 0.0,
+        /// The width of the undecided range beyond the clearance, in mesh units. If B comes that near and is no hit, the
+        /// answer may be [`MotionAnswer::Near`]. `None` stands for the default, which
+        /// [`MotionOptions::tolerance_between`] gives: a millionth of the diagonal of the smaller object's box. A smaller
+        /// tolerance costs more. A query refuses one that is not above 0 and finite.
+        tolerance(impl Into<Option<f64>>): Option<f64> = None,
+    }
 }
 
 impl MotionOptions {
-    /// Asks for contact, with the default tolerance.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Sets the distance that counts as a hit, in mesh units. A query refuses one that is negative or not finite.
-    #[must_use]
-    pub fn clearance(self, clearance: f64) -> Self {
-        Self { clearance, ..self }
-    }
-
-    /// Sets the tolerance in mesh units. A query refuses one that is not above 0 and finite.
-    #[must_use]
-    pub fn tolerance(self, tolerance: impl Into<Option<f64>>) -> Self {
-        Self { tolerance: tolerance.into(), ..self }
-    }
-
     /// Returns the tolerance of a question about two shapes, in mesh units: the one that is set, or else the default. That
     /// is a millionth of the smaller of both sizes, where the size of a shape is the largest diagonal of the boxes of its
     /// objects and twice its radius. If one of them is a point without a radius, the other's size counts; for two such

@@ -9,7 +9,7 @@ use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
 use crate::narrow::{Triangle, dot, subtract};
 use crate::pose::Pose;
-use crate::query::options::check;
+use crate::query::options::{check, options};
 use crate::query::patches::join::{Joined, Vertices};
 use crate::query::patches::measure::Measured;
 use crate::query::probe::placed::PlacedShape;
@@ -19,41 +19,20 @@ use crate::query::regions::ContactRegion;
 use crate::query::rounded::sum_of_radii;
 use std::ops::Range;
 
-/// How contacts are joined into patches, and how many of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct PatchOptions {
-    /// How far apart points of two contacts may be that belong together, in mesh units, beyond their errors.
-    pub tolerance: f64,
-    /// The number of contacts that are considered, the first ones in ascending order.
-    pub max_contacts: usize,
-}
-
-impl Default for PatchOptions {
-    fn default() -> Self {
-        Self { tolerance: 0.0, max_contacts: usize::MAX }
+options! {
+    /// How contacts are joined into patches, and how many of them. By default contacts with a point in common are joined, and all
+    /// of them are considered.
+    pub struct PatchOptions {
+        /// How far apart points of two contacts may be that belong together, in mesh units, beyond their errors. A query refuses a
+        /// length that is negative or not finite.
+        tolerance(f64): f64 = 0.0,
+        /// The number of contacts that are considered, the first ones in ascending order. With fewer than all, patches may be cut
+        /// off.
+        max_contacts(usize): usize = usize::MAX,
     }
 }
 
 impl PatchOptions {
-    /// Joins contacts with a point in common, and considers all of them.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Also joins contacts with points at most this far apart, in mesh units. A query refuses a tolerance that is negative or
-    /// not finite.
-    #[must_use]
-    pub fn tolerance(self, tolerance: f64) -> Self {
-        Self { tolerance, ..self }
-    }
-
-    /// Considers only the first contacts in ascending order. Patches may then be cut off.
-    #[must_use]
-    pub fn max_contacts(self, max_contacts: usize) -> Self {
-        Self { max_contacts, ..self }
-    }
-
     pub(crate) fn check(&self) -> Result<(), QueryError> {
         check(NumberError::PatchTolerance, self.tolerance)
     }
