@@ -3,7 +3,7 @@
 use crate::error::{FileChange, OpenError, QueryError};
 use crate::file::bvh::{Bvh, WeakBvh};
 use crate::file::owned_shape::OwnedShape;
-use crate::file::shape::{check_radius, rounding};
+use crate::file::shape::{Selection, Shape};
 use bvh_format::object::Object;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -58,21 +58,15 @@ struct Known {
 /// A shape in a scene. Either its file is open as long as the shape lives, or [`Files`] opens it only while a question
 /// needs it. Every shape whose file is open converts into one.
 #[derive(Clone, Debug)]
-pub struct SceneShape(Held);
+pub struct SceneShape {
+    file: Held,
+    selection: Selection,
+}
 
 #[derive(Clone, Debug)]
 enum Held {
-    Open(OwnedShape),
-    Stored(Files, Arc<Known>, Stored),
-}
-
-/// What a shape is, apart from its file.
-#[derive(Clone, Copy, Debug)]
-struct Stored {
-    /// The number of one object; `None` for all of the file.
-    object: Option<usize>,
-    radius: f64,
-    is_solid: bool,
+    Open(Bvh),
+    Stored(Files, Arc<Known>),
 }
 
 impl Files {
@@ -102,8 +96,8 @@ impl Files {
             bvh: Mutex::default(),
             last_use: AtomicU64::new(0),
         });
-        let stored = known.stored(None);
-        Ok(SceneShape(Held::Stored(self.clone(), known, stored)))
+        let selection = Selection::all(&known.objects);
+        Ok(SceneShape { file: Held::Stored(self.clone(), known), selection })
     }
 
     /// Returns how many files are open at present.
@@ -114,61 +108,51 @@ impl Files {
 
 impl<T: Into<OwnedShape>> From<T> for SceneShape {
     fn from(shape: T) -> Self {
-        Self(Held::Open(shape.into()))
+        let OwnedShape { bvh, selection } = shape.into();
+        Self { file: Held::Open(bvh), selection }
     }
 }
 
 impl SceneShape {
     /// Returns one object of the file as a shape, or `None` if the file has no object of this number.
     pub fn object(&self, number: usize) -> Option<Self> {
-        match &self.0 {
-            Held::Open(shape) => OwnedShape::object(shape.bvh().clone(), number).map(Self::from),
-            Held::Stored(files, known, _) => (number < known.objects.len())
-                .then(|| Self(Held::Stored(files.clone(), known.clone(), known.stored(Some(number))))),
-        }
+        let selection = Selection::one(self.all_objects(), number)?;
+        Some(Self { file: self.file.clone(), selection })
     }
 
     /// Returns the objects of the shape, as the file had them when it was first read.
     pub fn objects(&self) -> &[Object] {
-        match &self.0 {
-            Held::Open(shape) => shape.shape().objects(),
-            Held::Stored(_, known, Stored { object: Some(number), .. }) => &known.objects[*number..=*number],
-            Held::Stored(_, known, _) => &known.objects,
+        self.selection.of(self.all_objects())
+    }
+
+    /// Returns the objects of the file.
+    fn all_objects(&self) -> &[Object] {
+        match &self.file {
+            Held::Open(bvh) => bvh.objects(),
+            Held::Stored(_, known) => &known.objects,
         }
     }
 
-    /// Returns the shape with a radius: see [`Shape::rounded`](crate::Shape::rounded).
+    /// Returns the shape with a radius: see [`Shape::rounded`].
     ///
     /// # Errors
-    /// The errors of [`Shape::rounded`](crate::Shape::rounded).
+    /// The errors of [`Shape::rounded`].
     pub fn rounded(self, radius: f64) -> Result<Self, QueryError> {
-        check_radius(radius)?;
-        Ok(Self(match self.0 {
-            Held::Open(shape) => Held::Open(shape.rounded(radius)?),
-            Held::Stored(files, known, stored) => Held::Stored(files, known, Stored { radius, ..stored }),
-        }))
+        Ok(Self { selection: self.selection.rounded(radius)?, ..self })
     }
 
-    /// Returns the shape as a solid, for which its file is opened: see [`Shape::solid`](crate::Shape::solid).
+    /// Returns the shape as a solid, for which its file is opened: see [`Shape::solid`].
     ///
     /// # Errors
-    /// The errors of [`Shape::solid`](crate::Shape::solid), and [`QueryError::File`].
+    /// The errors of [`Shape::solid`], and [`QueryError::File`].
     pub fn solid(self) -> Result<Self, QueryError> {
-        self.held_open()?.shape().solid()?;
-        Ok(Self(match self.0 {
-            Held::Open(shape) => Held::Open(shape.solid()?),
-            Held::Stored(files, known, stored) => {
-                Held::Stored(files, known, Stored { is_solid: true, ..stored })
-            }
-        }))
+        self.in_file(&*self.file()?).check_closed()?;
+        Ok(Self { selection: self.selection.solid(), ..self })
     }
 
     /// Returns the radius, in mesh units.
     pub fn radius(&self) -> f64 {
-        match &self.0 {
-            Held::Open(shape) => shape.shape().radius(),
-            Held::Stored(_, _, stored) => stored.radius,
-        }
+        self.selection.radius
     }
 
     /// Opens the file, if it is not open, and returns the shape. The file stays open as long as the shape lives.
@@ -176,20 +160,21 @@ impl SceneShape {
     /// # Errors
     /// [`QueryError::File`] if the file is not there, or is no longer the one that was first read.
     pub fn opened(&self) -> Result<OwnedShape, QueryError> {
-        self.held_open().map(Cow::into_owned)
+        Ok(OwnedShape { bvh: self.file()?.into_owned(), selection: self.selection })
     }
 
-    /// Returns the shape for a question. A shape whose file is open is lent, because threads that count its uses would get in
-    /// each other's way.
-    pub(crate) fn held_open(&self) -> Result<Cow<'_, OwnedShape>, QueryError> {
-        let (files, known, stored) = match &self.0 {
-            Held::Open(shape) => return Ok(Cow::Borrowed(shape)),
-            Held::Stored(files, known, stored) => (files, known, *stored),
-        };
-        let bvh = files.open(known)?;
-        // The file has the objects it had, so that the number is one of them.
-        let shape = stored.object.and_then(|number| OwnedShape::object(bvh.clone(), number));
-        Ok(Cow::Owned(shape.unwrap_or_else(|| bvh.into()).of_valid(stored.radius, stored.is_solid)))
+    /// Returns the file for a question. A file that is open is lent, because threads that count its uses would get in each
+    /// other's way.
+    pub(crate) fn file(&self) -> Result<Cow<'_, Bvh>, QueryError> {
+        Ok(match &self.file {
+            Held::Open(bvh) => Cow::Borrowed(bvh),
+            Held::Stored(files, known) => Cow::Owned(files.open(known)?),
+        })
+    }
+
+    /// Returns the shape in its file, which has the objects that it had.
+    pub(crate) fn in_file<'a>(&self, file: &'a Bvh) -> Shape<'a> {
+        self.selection.in_file(file)
     }
 }
 
@@ -220,12 +205,6 @@ impl Files {
 }
 
 impl Known {
-    /// Returns one object or all, with what the file states for all of its objects.
-    fn stored(&self, object: Option<usize>) -> Stored {
-        let (radius, is_solid) = rounding(&self.objects);
-        Stored { object, radius, is_solid }
-    }
-
     fn open_again(&self, open_file: fn(&Path) -> Result<Bvh, OpenError>) -> Result<Bvh, QueryError> {
         let failed = |found| QueryError::File { path: self.path.clone(), found };
         let bvh = open_file(&self.path).map_err(|error| {

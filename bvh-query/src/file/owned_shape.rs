@@ -2,7 +2,7 @@
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
-use crate::file::shape::{Shape, check_radius, rounding};
+use crate::file::shape::{Selection, Shape, rounding};
 use bvh_format::rewrite_rounding::with_rounding;
 use std::borrow::Cow;
 
@@ -28,27 +28,20 @@ use std::borrow::Cow;
 /// ```
 #[derive(Clone, Debug)]
 pub struct OwnedShape {
-    bvh: Bvh,
-    /// The number of one object; `None` for all of the file.
-    object: Option<usize>,
-    radius: f64,
-    is_solid: bool,
+    pub(super) bvh: Bvh,
+    pub(super) selection: Selection,
 }
 
 impl OwnedShape {
     /// Returns one object of a file as a shape, or `None` if the file has no object of this number.
     pub fn object(bvh: Bvh, number: usize) -> Option<Self> {
-        bvh.object(number)?;
-        Some(Self { object: Some(number), ..Self::from(bvh) })
+        let selection = Selection::one(bvh.objects(), number)?;
+        Some(Self { bvh, selection })
     }
 
     /// Returns the shape in the form that questions take.
     pub fn shape(&self) -> Shape<'_> {
-        let core = match self.object {
-            Some(number) => self.bvh.object(number).expect("the number was checked when the shape was made"),
-            None => self.bvh.all(),
-        };
-        core.of_valid(self.radius, self.is_solid)
+        self.selection.in_file(&self.bvh)
     }
 
     /// Returns the shape with a radius: see [`Shape::rounded`].
@@ -56,8 +49,7 @@ impl OwnedShape {
     /// # Errors
     /// The errors of [`Shape::rounded`].
     pub fn rounded(self, radius: f64) -> Result<Self, QueryError> {
-        check_radius(radius)?;
-        Ok(Self { radius, ..self })
+        Ok(Self { selection: self.selection.rounded(radius)?, ..self })
     }
 
     /// Returns the shape as a solid: see [`Shape::solid`].
@@ -65,18 +57,13 @@ impl OwnedShape {
     /// # Errors
     /// The errors of [`Shape::solid`].
     pub fn solid(self) -> Result<Self, QueryError> {
-        self.shape().solid()?;
-        Ok(Self { is_solid: true, ..self })
+        self.shape().check_closed()?;
+        Ok(self.solid_if(true))
     }
 
     /// Returns the shape, and as a solid if the argument says so, which the file has promised to be closed.
     pub(crate) fn solid_if(self, is_solid: bool) -> Self {
-        Self { is_solid: self.is_solid || is_solid, ..self }
-    }
-
-    /// Returns the shape with a radius and solidity that were checked.
-    pub(crate) fn of_valid(self, radius: f64, is_solid: bool) -> Self {
-        Self { radius, is_solid, ..self }
+        if is_solid { Self { selection: self.selection.solid(), ..self } } else { self }
     }
 
     /// Returns the bytes of a file that states the radius and the solidity of this shape: the file that it is in, or a copy of
@@ -88,11 +75,12 @@ impl OwnedShape {
     /// [`QueryError::Damaged`] if a copy is needed and a mapped file is no longer what it was when it was opened.
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>, QueryError> {
         let bytes = self.bvh.bytes();
-        let is_solid = self.is_solid && self.bvh.all().is_closed().is_ok_and(|is_closed| is_closed);
-        if rounding(self.bvh.objects()) == (self.radius, is_solid) {
+        let Selection { radius, is_solid, .. } = self.selection;
+        let is_solid = is_solid && self.bvh.all().is_closed().is_ok_and(|is_closed| is_closed);
+        if rounding(self.bvh.objects()) == (radius, is_solid) {
             return Ok(Cow::Borrowed(bytes));
         }
-        Ok(Cow::Owned(with_rounding(bytes, self.radius, is_solid)?))
+        Ok(Cow::Owned(with_rounding(bytes, radius, is_solid)?))
     }
 
     /// Returns the file that the shape is in.
@@ -104,8 +92,7 @@ impl OwnedShape {
 impl From<Bvh> for OwnedShape {
     /// Returns all objects of a file as one shape.
     fn from(bvh: Bvh) -> Self {
-        let (radius, is_solid) = rounding(bvh.objects());
-        Self { bvh, object: None, radius, is_solid }
+        Self { selection: Selection::all(bvh.objects()), bvh }
     }
 }
 

@@ -13,13 +13,13 @@ impl Bvh {
 
     /// Returns all objects of the file as one shape, with the radius that the file states, and solid if it says so.
     pub fn all(&self) -> Shape<'_> {
-        Shape::of_objects(self, 0, self.objects().len())
+        Selection::all(self.objects()).in_file(self)
     }
 
     /// Returns one object of the file as a shape, with the radius that the file states, and solid if it says so. Returns
     /// `None` if the file has no object of this number.
     pub fn object(&self, number: usize) -> Option<Shape<'_>> {
-        (number < self.objects().len()).then(|| Shape::of_objects(self, number, number + 1))
+        Selection::one(self.objects(), number).map(|selection| selection.in_file(self))
     }
 }
 
@@ -39,19 +39,51 @@ impl Bvh {
 #[derive(Clone, Copy, Debug)]
 pub struct Shape<'a> {
     bvh: &'a Bvh,
+    selection: Selection,
+}
+
+/// What a shape is, apart from its file: some objects, which all have the same radius, and are all solid or none of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Selection {
     first: usize,
     end: usize,
-    radius: f64,
-    is_solid: bool,
+    pub(super) radius: f64,
+    pub(super) is_solid: bool,
+}
+
+impl Selection {
+    /// Selects all objects of a file, with what it states for them.
+    pub(super) fn all(objects: &[Object]) -> Self {
+        let (radius, is_solid) = rounding(objects);
+        Self { first: 0, end: objects.len(), radius, is_solid }
+    }
+
+    /// Selects one object of a file, or returns `None` if the file has no object of this number.
+    pub(super) fn one(objects: &[Object], number: usize) -> Option<Self> {
+        (number < objects.len()).then(|| Self { first: number, end: number + 1, ..Self::all(objects) })
+    }
+
+    /// Returns those of the objects of the file that are selected.
+    pub(super) fn of<'a>(&self, objects: &'a [Object]) -> &'a [Object] {
+        &objects[self.first..self.end]
+    }
+
+    pub(super) fn rounded(self, radius: f64) -> Result<Self, QueryError> {
+        check_radius(radius)?;
+        Ok(Self { radius, ..self })
+    }
+
+    /// Returns the shape as a solid, which was checked.
+    pub(super) fn solid(self) -> Self {
+        Self { is_solid: true, ..self }
+    }
+
+    pub(super) fn in_file(self, bvh: &Bvh) -> Shape<'_> {
+        Shape { bvh, selection: self }
+    }
 }
 
 impl<'a> Shape<'a> {
-    /// Returns some objects of a file, which all have the same radius, and are all solid or none of them.
-    fn of_objects(bvh: &'a Bvh, first: usize, end: usize) -> Self {
-        let (radius, is_solid) = rounding(bvh.objects());
-        Self { bvh, first, end, radius, is_solid }
-    }
-
     /// Returns the file that the shape is in.
     pub fn bvh(&self) -> &'a Bvh {
         self.bvh
@@ -59,12 +91,12 @@ impl<'a> Shape<'a> {
 
     /// Returns the objects of the shape.
     pub fn objects(&self) -> &'a [Object] {
-        &self.bvh.objects()[self.first..self.end]
+        self.selection.of(self.bvh.objects())
     }
 
     /// Returns the numbers that these objects have in the file.
     pub fn object_numbers(&self) -> Range<usize> {
-        self.first..self.end
+        self.selection.first..self.selection.end
     }
 
     /// Returns the number of triangles stored for all objects of the shape.
@@ -77,8 +109,7 @@ impl<'a> Shape<'a> {
     /// # Errors
     /// [`QueryError::Number`] if the radius is negative, NaN or above 2^118.
     pub fn rounded(self, radius: f64) -> Result<Self, QueryError> {
-        check_radius(radius)?;
-        Ok(Self { radius, ..self })
+        Ok(Self { selection: self.selection.rounded(radius)?, ..self })
     }
 
     /// Returns the shape as a solid: what is inside it touches it.
@@ -89,7 +120,7 @@ impl<'a> Shape<'a> {
     /// [`QueryError::NoTopology`] if the file was baked without topology; [`QueryError::Damaged`] if that is damaged.
     pub fn solid(self) -> Result<Self, QueryError> {
         self.check_closed()?;
-        Ok(Self { is_solid: true, ..self })
+        Ok(Self { selection: self.selection.solid(), ..self })
     }
 
     /// Returns whether all objects of the shape are closed. This never counts open edges, as the error of [`Shape::solid`] does.
@@ -126,37 +157,33 @@ impl<'a> Shape<'a> {
 
     /// Returns the radius, in mesh units.
     pub fn radius(&self) -> f64 {
-        self.radius
+        self.selection.radius
     }
 
     /// Returns whether what is inside the shape touches it.
     pub fn is_solid(&self) -> bool {
-        self.is_solid
+        self.selection.is_solid
     }
 
     /// Returns the shape with a larger radius: the sum of the present one and a margin that was checked, rounded to nearest.
     pub(crate) fn with_margin(self, margin: f64) -> Self {
-        Self { radius: self.radius + margin, ..self }
-    }
-
-    /// Returns the shape with a radius and solidity that were checked.
-    pub(crate) fn of_valid(self, radius: f64, is_solid: bool) -> Self {
-        Self { radius, is_solid, ..self }
+        let selection = Selection { radius: self.radius() + margin, ..self.selection };
+        Self { selection, ..self }
     }
 
     /// Returns what tells this shape from every other one of this process, those of closed files included.
     pub(crate) fn identity(&self) -> (u64, usize, usize) {
-        (self.bvh.identity(), self.first, self.end)
+        (self.bvh.identity(), self.selection.first, self.selection.end)
     }
 
     /// Returns the number that its first object has in the file.
     pub(crate) fn first(&self) -> usize {
-        self.first
+        self.selection.first
     }
 
     /// Returns the object that has this number in the file, if it belongs to the shape.
     pub(crate) fn numbered(&self, number: u32) -> Option<&'a Object> {
-        self.objects().get((number as usize).checked_sub(self.first)?)
+        self.objects().get((number as usize).checked_sub(self.first())?)
     }
 }
 

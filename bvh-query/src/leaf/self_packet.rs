@@ -24,7 +24,7 @@
 //! the vertices, and filters compare the corners with a charge: with E' = E + 2d and D' = D + 2d, a height is a sum of six
 //! products of two edges and a difference, so it changes by at most 6 (E'^2 D' - E^2 D), below 12d E'^2 + 24d E' D'. A height
 //! beyond an edge is a sum of twelve products, one of whose edges may be twice as long, so it changes by less than
-//! 48d E'^3 + 144d E'^2 D'. A third more is charged for roundings. Corrected vertices may differ where corners do not, and are
+//! 48d E'^3 + 144d E'^2 D'. At least a ninth more is charged for roundings. Corrected vertices may differ where corners do not, and are
 //! always compared exactly.
 
 use crate::isa::{Isa, Lanes};

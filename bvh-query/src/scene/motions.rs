@@ -345,10 +345,11 @@ impl Scene {
                 let relative = RelativePath::new(tracks.path(a, one), tracks.path(b, other));
                 let together = tracks.together(a, b);
                 let path: &dyn RigidPath = together.as_ref().map_or(&relative, |together| together);
-                let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
+                let (file_a, file_b) = (one.shape.file()?, other.shape.file()?);
                 let pair = ScenePair { a: one.id(a), b: other.id(b) };
                 let margin = one.margin + scene.contents.margin_of_pair(a, b);
-                let (a, b) = (shape_a.shape().with_margin(margin), shape_b.shape().with_margin(other.margin));
+                let a = one.shape.in_file(&file_a).with_margin(margin);
+                let b = other.shape.in_file(&file_b).with_margin(other.margin);
                 scene.workers.ask_rest(querier, |querier| ask(querier, pair, a, b, path))
             });
             let found = found.map_err(|(number, source)| {

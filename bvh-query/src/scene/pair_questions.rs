@@ -508,9 +508,10 @@ impl Scene {
         let (one, other, ids) = (self.contents.known(a), self.contents.known(b), self.ids(a, b));
         let pose = Pose::relative_of_instances(&one.world, &other.world);
         let before = querier.questions();
-        let (shape_a, shape_b) = (one.shape.held_open()?, other.shape.held_open()?);
+        let (file_a, file_b) = (one.shape.file()?, other.shape.file()?);
         let (tracker, margin) = (self.trackers.get((a, b)), one.margin + self.contents.margin_of_pair(a, b));
-        let (a, b) = (shape_a.shape().with_margin(margin), shape_b.shape().with_margin(other.margin));
+        let a = one.shape.in_file(&file_a).with_margin(margin);
+        let b = other.shape.in_file(&file_b).with_margin(other.margin);
         let pair = &mut InstancePair { ids, a, b, pose, tracker };
         let answer = self.workers.ask_rest(querier, |querier| ask(querier, pair));
         asked.fetch_add(querier.questions() - before, Ordering::Relaxed);

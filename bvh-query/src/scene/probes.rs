@@ -250,8 +250,8 @@ impl Asked<'_> {
             let instance = scene.contents.known(place);
             let id = instance.id(place);
             let mut ask = || {
-                let shape = instance.shape.held_open()?;
-                let rounded = shape.shape().with_margin(instance.margin);
+                let file = instance.shape.file()?;
+                let rounded = instance.shape.in_file(&file).with_margin(instance.margin);
                 let placed = PlacedShape { instance: place, ..rounded.at(&instance.world) };
                 visit(querier, id, placed, key)
             };
