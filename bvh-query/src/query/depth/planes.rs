@@ -4,7 +4,7 @@ use crate::narrow::{Point, cross, dot};
 
 /// A half-space: the points whose height along a unit normal is at least `height`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
+pub(super) struct HalfSpace {
     pub(super) normal: Point,
     pub(super) height: f64,
 }
@@ -14,11 +14,11 @@ const SHORTFALL: f64 = 1e-9;
 
 /// Returns the shortest vector that is beyond all of some planes, to within roundings; none if there is no such vector. It is
 /// the nearest point of the planes, lines or points in which up to three of them meet. Cost: some nanoseconds for each three.
-pub(super) fn shortest_beyond(planes: &[Plane]) -> Option<Point> {
+pub(super) fn shortest_beyond(planes: &[HalfSpace]) -> Option<Point> {
     let mut best: Option<Point> = None;
     let mut offer = |point: Point| {
         let length = dot(point, point).sqrt();
-        let is_beyond = |plane: &Plane| dot(plane.normal, point) >= plane.height - SHORTFALL * length;
+        let is_beyond = |plane: &HalfSpace| dot(plane.normal, point) >= plane.height - SHORTFALL * length;
         if length.is_finite()
             && best.is_none_or(|best| dot(best, best).sqrt() > length)
             && planes.iter().all(is_beyond)

@@ -30,7 +30,7 @@ pub(super) struct Joined {
 }
 
 /// A point to be compared with others.
-struct Placed {
+struct SortedPoint {
     /// A lower bound.
     height: f64,
     point: [f64; 3],
@@ -38,7 +38,7 @@ struct Placed {
     number: usize,
 }
 
-impl Placed {
+impl SortedPoint {
     fn new(point: [f64; 3], error: f64, number: usize) -> Self {
         let height = dot(DIRECTION, point) - height_error(point);
         Self { height, point, error, number }
@@ -59,7 +59,7 @@ impl Vertices {
         for region in regions {
             starts.push(points.len());
             for point in region.points() {
-                points.push(Placed::new(*point, region.error + tolerance / 2.0, points.len()));
+                points.push(SortedPoint::new(*point, region.error + tolerance / 2.0, points.len()));
             }
         }
         starts.push(points.len());
@@ -105,7 +105,7 @@ impl Vertices {
 }
 
 /// Joins points that are no farther apart than their errors together. Which they are depends on no order.
-fn join_points(mut points: Vec<Placed>, sets: &mut Sets, budget: &mut Budget) -> Result<(), QueryError> {
+fn join_points(mut points: Vec<SortedPoint>, sets: &mut Sets, budget: &mut Budget) -> Result<(), QueryError> {
     points.sort_unstable_by(|p, q| {
         let order = |p: f64, q: f64| p.total_cmp(&q);
         let by_point = || (0..3).map(|k| order(p.point[k], q.point[k])).find(|order| order.is_ne());
@@ -182,7 +182,7 @@ mod tests {
     use cbvh_testkit::Random;
 
     /// Joins by comparing all points.
-    fn of_all_pairs(points: &[Placed]) -> Vec<usize> {
+    fn of_all_pairs(points: &[SortedPoint]) -> Vec<usize> {
         let mut sets = Sets::new(points.len());
         for p in points {
             for q in points {
@@ -207,7 +207,7 @@ mod tests {
                 let nudge = [0.0, f64::EPSILON * far, scale * 1e-3][random.below(3)];
                 let point = [p[0] + nudge, p[1], p[2] - nudge];
                 let error = scale * [0.0, 1e-4, 0.01, 0.12][random.below(4)];
-                points.push(Placed::new(point, error, number));
+                points.push(SortedPoint::new(point, error, number));
             }
             let expected = of_all_pairs(&points);
             let mut sets = Sets::new(points.len());

@@ -8,20 +8,18 @@ use bvh_format::vec3::length;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 
-type Vector = [f64; 3];
-
 /// What a patch is like.
 pub(super) struct Measured {
-    pub(super) center: Vector,
-    pub(super) normal: Vector,
+    pub(super) center: [f64; 3],
+    pub(super) normal: [f64; 3],
     pub(super) length: f64,
     pub(super) area: f64,
 }
 
 /// A part of a curve, which several contacts may have in common.
-struct Segment {
+struct CurvePart {
     /// Its ends, the vertex of the lesser number first.
-    points: [Vector; 2],
+    points: [[f64; 3]; 2],
     /// How many contacts it has from the first end to the second one, less those the other way.
     turns: i32,
     error: f64,
@@ -33,17 +31,17 @@ const CLEAR: f64 = 1024.0;
 /// A weighted mean of vectors.
 #[derive(Default)]
 struct Mean {
-    sum: Vector,
+    sum: [f64; 3],
     weight: f64,
 }
 
 impl Mean {
-    fn add(&mut self, weight: f64, point: Vector) {
+    fn add(&mut self, weight: f64, point: [f64; 3]) {
         add(&mut self.sum, weight, point);
         self.weight += weight;
     }
 
-    fn value(&self) -> Option<Vector> {
+    fn value(&self) -> Option<[f64; 3]> {
         (self.weight > 0.0).then(|| self.sum.map(|x| x / self.weight))
     }
 }
@@ -88,7 +86,7 @@ pub(super) fn measure(regions: &[ContactRegion], vertices: &Vertices, contacts: 
         let [p, q] = [p, q].map(length);
         error += (p + q) * segment.error + 16.0 * UNIT_ROUNDOFF * p * q;
     }
-    let clear = |push: &Vector| length(*push) > CLEAR * NORMAL_ERROR;
+    let clear = |push: &[f64; 3]| length(*push) > CLEAR * NORMAL_ERROR;
     let push = pushes.iter().filter_map(Mean::value).find(clear).unwrap_or_default();
     let is_clear = length(vector) > CLEAR * error && dot(unit(vector), unit(push)) >= 0.0;
     Measured {
@@ -100,7 +98,7 @@ pub(super) fn measure(regions: &[ContactRegion], vertices: &Vertices, contacts: 
 }
 
 /// Returns the direction in which two triangles push B.
-fn push(region: &ContactRegion) -> Vector {
+fn push(region: &ContactRegion) -> [f64; 3] {
     subtract(region.normal_a, region.normal_b)
 }
 
@@ -122,17 +120,17 @@ fn polygons<'r>(
 }
 
 /// Returns the segments of a patch, each once: the first contact gives its points.
-fn segments(regions: &[ContactRegion], vertices: &Vertices, contacts: &[usize]) -> Vec<Segment> {
-    let (mut segments, mut places) = (Vec::<Segment>::new(), HashMap::new());
+fn segments(regions: &[ContactRegion], vertices: &Vertices, contacts: &[usize]) -> Vec<CurvePart> {
+    let (mut segments, mut places) = (Vec::<CurvePart>::new(), HashMap::new());
     for &i in contacts {
         let region = &regions[i];
         if region.kind != RegionKind::Segment {
             continue;
         }
         if let ([p, q], [first, last]) = (region.points(), vertices.of(i)) {
-            let mut segment = Segment { points: [*p, *q], turns: 1, error: region.error };
+            let mut segment = CurvePart { points: [*p, *q], turns: 1, error: region.error };
             if first > last {
-                segment = Segment { points: [*q, *p], turns: -1, ..segment };
+                segment = CurvePart { points: [*q, *p], turns: -1, ..segment };
             }
             match places.entry([*first.min(last), *last.max(first)]) {
                 Entry::Vacant(place) => {
@@ -153,12 +151,12 @@ fn segments(regions: &[ContactRegion], vertices: &Vertices, contacts: &[usize]) 
 /// The area and the centre of a polygon, seen from a point.
 struct Polygon {
     area: f64,
-    center: Vector,
+    center: [f64; 3],
 }
 
 impl Polygon {
     /// Cuts the polygon into triangles at its first corner.
-    fn new(region: &ContactRegion, base: Vector) -> Self {
+    fn new(region: &ContactRegion, base: [f64; 3]) -> Self {
         let Some((first, rest)) = region.points().split_first() else {
             return Self { area: 0.0, center: [0.0; 3] };
         };
@@ -172,7 +170,7 @@ impl Polygon {
     }
 }
 
-fn add(sum: &mut Vector, weight: f64, v: Vector) {
+fn add(sum: &mut [f64; 3], weight: f64, v: [f64; 3]) {
     for (sum, x) in sum.iter_mut().zip(v) {
         *sum += weight * x;
     }

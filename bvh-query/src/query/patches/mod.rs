@@ -125,17 +125,17 @@ impl Querier {
         } else {
             vertices.join()
         };
-        let asked = Asked { a: a.into(), b: b.at(pose), is_rounded: sum_of_radii(a, b) > 0.0 };
+        let sides = PlacedSides { a: a.into(), b: b.at(pose), is_rounded: sum_of_radii(a, b) > 0.0 };
         let mut patches = Vec::with_capacity(ranges.len());
         for Range { start, end } in ranges {
             let contacts = &order[start..end];
             let Measured { center, normal, length, area } = measure::measure(&found, &vertices, contacts);
             let mut patch =
                 Patch { first: start, count: end - start, center, normal, length, area, depth: 0.0 };
-            patch.depth = if asked.is_rounded {
+            patch.depth = if sides.is_rounded {
                 contacts.iter().fold(0.0, |most: f64, &i| most.max(found[i].overlap))
             } else {
-                self.thickness(&asked, &patch, contacts.iter().map(|&i| &triangles[i]))?
+                self.thickness(&sides, &patch, contacts.iter().map(|&i| &triangles[i]))?
             };
             patches.push(patch);
         }
@@ -145,7 +145,7 @@ impl Querier {
     /// Returns the largest thickness of the overlap along some lines.
     fn thickness<'t>(
         &mut self,
-        asked: &Asked<'_>,
+        sides: &PlacedSides<'_>,
         patch: &Patch,
         triangles: impl Iterator<Item = &'t [Triangle; 2]>,
     ) -> Result<f64, QueryError> {
@@ -159,12 +159,12 @@ impl Querier {
             of_b.iter().for_each(|corner| deepest_b.add(*corner, dot(down, subtract(*corner, patch.center))));
         }
         let mut depth =
-            self.way_out(&asked.a, patch.center, up)? + self.way_out(&asked.b, patch.center, down)?;
+            self.way_out(&sides.a, patch.center, up)? + self.way_out(&sides.b, patch.center, down)?;
         for corner in deepest_b.corners() {
-            depth = depth.max(self.way_out(&asked.a, corner, up)?);
+            depth = depth.max(self.way_out(&sides.a, corner, up)?);
         }
         for corner in deepest_a.corners() {
-            depth = depth.max(self.way_out(&asked.b, corner, down)?);
+            depth = depth.max(self.way_out(&sides.b, corner, down)?);
         }
         Ok(depth)
     }
@@ -184,8 +184,8 @@ impl Querier {
     }
 }
 
-/// The shapes that were asked about, in A's frame.
-struct Asked<'a> {
+/// The shapes of a question, in A's frame.
+struct PlacedSides<'a> {
     a: PlacedShape<'a>,
     b: PlacedShape<'a>,
     is_rounded: bool,

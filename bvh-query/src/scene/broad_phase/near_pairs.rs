@@ -1,7 +1,7 @@
 //! The pairs of instances that are near each other: all within a distance, or one after another, the nearest first.
 
 use super::least_first::LeastFirst;
-use super::tree::{Child, Part, Tree, squared_limit};
+use super::tree::{Child, Subtree, Tree, squared_limit};
 use super::{BroadPhase, Which};
 use crate::error::QueryError;
 use crate::isa::{Isa, Task};
@@ -26,7 +26,7 @@ pub(super) struct NearPairs<'a, V> {
 /// A part of one tree, to be compared with the children of a node of the other tree.
 #[derive(Clone, Copy)]
 struct Facing {
-    part: Part,
+    part: Subtree,
     node: u32,
     /// Whether the part is of the second tree.
     is_swapped: bool,

@@ -59,7 +59,7 @@ pub(super) enum Child {
 
 /// A part of a tree, as it is compared with others.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
+pub(super) struct Subtree {
     pub(super) child: Child,
     pub(super) bounds: OuterBox,
     pub(super) groups: Groups,
@@ -104,10 +104,10 @@ impl Node {
     }
 
     #[inline(always)]
-    fn part(&self, lane: usize) -> Part {
+    fn part(&self, lane: usize) -> Subtree {
         let bounds =
             OuterBox { lo: [0, 1, 2].map(|k| self.lo[k][lane]), hi: [0, 1, 2].map(|k| self.hi[k][lane]) };
-        Part { child: self.children[lane], bounds, groups: self.groups[lane] }
+        Subtree { child: self.children[lane], bounds, groups: self.groups[lane] }
     }
 
     /// Computes what is around all children. Returns whether it has changed.
@@ -156,9 +156,9 @@ impl Tree {
     }
 
     /// Returns all of it as one part; nothing if it is empty.
-    pub(super) fn whole(&self) -> Option<Part> {
+    pub(super) fn whole(&self) -> Option<Subtree> {
         let root = self.nodes.first()?;
-        Some(Part { child: Child::Node(0), bounds: root.bounds, groups: root.union })
+        Some(Subtree { child: Child::Node(0), bounds: root.bounds, groups: root.union })
     }
 
     /// Returns the numbers of the nodes in which pairs are to be found: those whose groups meet themselves.
@@ -169,14 +169,14 @@ impl Tree {
     }
 
     /// Returns the children of a node.
-    pub(super) fn parts(&self, node: u32) -> impl Iterator<Item = Part> + '_ {
+    pub(super) fn parts(&self, node: u32) -> impl Iterator<Item = Subtree> + '_ {
         let node = &self.nodes[node as usize];
         (0..node.count).map(|lane| node.part(lane))
     }
 
     /// Returns the child in a lane of a node.
     #[inline(always)]
-    pub(super) fn part(&self, node: u32, lane: usize) -> Part {
+    pub(super) fn part(&self, node: u32, lane: usize) -> Subtree {
         self.nodes[node as usize].part(lane)
     }
 
