@@ -96,7 +96,7 @@ pub use file::shape::Shape;
 #[doc(hidden)]
 pub use isa::floats;
 pub use isa::{Backend, BackendError};
-pub use motion::{Motion, PathError, Polyline, RelativePath, RigidPath};
+pub use motion::{Motion, Polyline, RelativePath, RigidPath};
 pub use narrow::SelfContactKind;
 pub use pose::{Pose, PoseError};
 #[cfg(feature = "parallel")]
@@ -122,8 +122,8 @@ pub use query::self_contacts::SelfContact;
 pub use query::stats::QueryStats;
 pub use query::tracker::Tracker;
 pub use scene::{
-    Groups, InstanceError, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact,
-    SceneDistance, SceneError, SceneFileError, SceneMotionAnswer, ScenePair, SceneRayHit, WorldPoseError,
+    Groups, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact, SceneDistance,
+    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
@@ -180,17 +180,11 @@ pub enum Error {
     Format(#[from] FormatError),
     /// A backend is not available.
     Backend(#[from] BackendError),
-    /// Numbers make no pose.
+    /// Numbers make no pose, or poses or numbers make no path.
     Pose(#[from] PoseError),
-    /// Poses or numbers make no path.
-    Path(#[from] PathError),
     /// A question about meshes has no answer.
     Query(#[from] QueryError),
-    /// A file makes no scene.
-    SceneFile(#[from] SceneFileError),
-    /// A scene refuses an instance, or does not have it.
-    Instance(#[from] InstanceError),
-    /// A question about a scene has no answer.
+    /// A file makes no scene, a scene refuses an instance or does not have it, or a question about it has no answer.
     Scene(#[from] SceneError),
 }
 

@@ -1,9 +1,7 @@
 //! What a function returns when it fails: a status for the program, and a message for a person.
 
 use bvh_bake::{BakeError, ReadError, ShapeError};
-use bvh_query::{
-    BackendError, InstanceError, OpenError, PathError, PoseError, QueryError, SceneError, SceneFileError,
-};
+use bvh_query::{BackendError, OpenError, PoseError, QueryError, SceneError};
 use cbvh_robot::RobotError;
 use std::fmt::Display;
 
@@ -62,17 +60,9 @@ fn of_scene(error: &SceneError) -> Status {
         SceneError::Pair { source, .. } | SceneError::Instance { source, .. } | SceneError::Query(source) => {
             of_query(source)
         }
-        SceneError::Refused(error) => of_instance(error),
+        SceneError::NoInstance(_) => Status::NotFound,
         _ => Status::InvalidArgument,
     }
-}
-
-fn of_instance(error: &InstanceError) -> Status {
-    if matches!(error, InstanceError::NoInstance(_)) { Status::NotFound } else { Status::InvalidArgument }
-}
-
-fn of_scene_file(error: &SceneFileError) -> Status {
-    if matches!(error, SceneFileError::Damaged(_)) { Status::Damaged } else { Status::InvalidArgument }
 }
 
 fn of_open(error: &OpenError) -> Status {
@@ -114,6 +104,5 @@ macro_rules! failures {
     )* };
 }
 failures!(QueryError: of_query, SceneError: of_scene, OpenError: of_open, BakeError: of_bake);
-failures!(InstanceError: of_instance, SceneFileError: of_scene_file, BackendError: |_| Status::InvalidArgument);
-failures!(PoseError: |_| Status::InvalidArgument, PathError: |_| Status::InvalidArgument);
+failures!(BackendError: |_| Status::InvalidArgument, PoseError: |_| Status::InvalidArgument);
 failures!(ShapeError: |_| Status::InvalidArgument, RobotError: of_robot);

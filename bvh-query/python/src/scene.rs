@@ -11,8 +11,7 @@ use crate::errors::{FormatError, backend_error, open_error, query_error, questio
 use crate::mesh::Mesh;
 use crate::paths::locked;
 use bvh_query::{
-    Bvh, Groups, InstanceError, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair,
-    SceneShape,
+    Bvh, Groups, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair, SceneShape,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -100,10 +99,10 @@ impl State {
                 question_error(&source, format!("instance {}: {source}", self.called(&instance)))
             }
             SceneError::Query(source) => query_error(source),
-            SceneError::Refused(InstanceError::Pose { instance, source }) => {
+            SceneError::Pose { instance, source } => {
                 value_error(&format!("instance {}", self.called(&instance)), source)
             }
-            SceneError::Refused(InstanceError::Cycle { child, parent }) => value_error(
+            SceneError::Cycle { child, parent } => value_error(
                 "parent",
                 format!(
                     "expected an instance that does not move with instance {}, found {}",
@@ -150,7 +149,7 @@ impl Scene {
         &self,
         py: Python<'_>,
         number: i64,
-        work: impl FnOnce(&mut bvh_query::Scene, InstanceId) -> Result<T, InstanceError> + Send,
+        work: impl FnOnce(&mut bvh_query::Scene, InstanceId) -> Result<T, SceneError> + Send,
     ) -> PyResult<T> {
         self.with(py, |state| {
             let id = state.id(number, "id")?;
@@ -163,7 +162,7 @@ impl Scene {
         &self,
         py: Python<'_>,
         [a, b]: [(i64, &str); 2],
-        work: impl FnOnce(&mut bvh_query::Scene, InstanceId, InstanceId) -> Result<T, InstanceError> + Send,
+        work: impl FnOnce(&mut bvh_query::Scene, InstanceId, InstanceId) -> Result<T, SceneError> + Send,
     ) -> PyResult<T> {
         self.with(py, |state| {
             let (a, b) = (state.id(a.0, a.1)?, state.id(b.0, b.1)?);
@@ -312,8 +311,8 @@ impl Scene {
                 None => state.scene.add(shape, pose),
             };
             let id = added.map_err(|error| match error {
-                InstanceError::Pose { source, .. } => value_error("pose", source),
-                InstanceError::NameTaken(name) => {
+                SceneError::Pose { source, .. } => value_error("pose", source),
+                SceneError::NameTaken(name) => {
                     value_error("name", format!("expected one that no instance has, found {name:?}"))
                 }
                 error => state.refused(error),

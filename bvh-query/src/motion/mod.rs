@@ -7,6 +7,6 @@ mod polyline;
 mod relative;
 
 pub(crate) use attached::{AttachedPath, TogetherPath};
-pub use path::{Motion, PathError, RigidPath};
+pub use path::{Motion, RigidPath};
 pub use polyline::Polyline;
 pub use relative::RelativePath;

@@ -57,36 +57,6 @@ impl<P: RigidPath + ?Sized> RigidPath for &P {
 /// The least cosine of half the angle between two poses for which it is certain which rotation is the shorter one.
 const MIN_HALF_COSINE: f64 = 1e-9;
 
-/// Why poses or numbers make no path.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PathError {
-    /// The poses are half a turn apart, so that neither way round is the shorter one.
-    #[error("expected a turn of less than half a circle, found {0} radians; divide it by a pose between")]
-    HalfTurn(f64),
-    /// The direction of an axis, by its largest component.
-    #[error("direction: expected a finite direction of a length above 0, found {0}")]
-    Direction(f64),
-    /// A coordinate of a point on an axis.
-    #[error("point: expected finite coordinates, found {0}")]
-    Point(f64),
-    /// The angle of a screw, in radians.
-    #[error("angle: expected a finite number of at most 1e9 radians, found {0}")]
-    Angle(f64),
-    /// The shift of a screw.
-    #[error("shift: expected a finite number, found {0}")]
-    Shift(f64),
-    /// How far from A's origin a screw may take B.
-    #[error("point: expected an axis and a shift with which B stays within 2^120, found {0}")]
-    TooFar(f64),
-    /// A pose on the way that no query takes.
-    #[error(transparent)]
-    Pose(#[from] PoseError),
-    /// A polyline of fewer than two poses.
-    #[error("expected at least two poses, found {0}")]
-    TooFewPoses(usize),
-}
-
 /// A rotation at a constant rate about an axis of A's frame, with a translation at a constant rate: [`Motion::between`] two
 /// poses, or a [`Motion::screw`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,15 +92,15 @@ impl Motion {
     /// and the difference from it is interpolated linearly. If both rotations are equal, B keeps that rotation, bit for bit.
     ///
     /// # Errors
-    /// [`PathError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
-    pub fn between(start: &Pose, end: &Pose) -> Result<Self, PathError> {
+    /// [`PoseError::HalfTurn`] if the poses are half a turn apart, to within 2e-9 radians.
+    pub fn between(start: &Pose, end: &Pose) -> Result<Self, PoseError> {
         let nearest = |pose: &Pose| Pose::nearest(*pose.rotation(), [0.0; 3]).map(|pose| *pose.rotation());
         let (first, last) = (nearest(start)?, nearest(end)?);
         let [x, y, z, w] = quaternion(&product(&last, &transposed(&first)));
         let sine = (x * x + y * y + z * z).sqrt();
         let angle = 2.0 * libm::atan2(sine, w);
         if w < MIN_HALF_COSINE {
-            return Err(PathError::HalfTurn(angle));
+            return Err(PoseError::HalfTurn(angle));
         }
         let axis = if sine > 0.0 { [x / sine, y / sine, z / sine] } else { [1.0, 0.0, 0.0] };
         let reached = product(&rodrigues(axis, angle), &first);
@@ -150,8 +120,8 @@ impl Motion {
     /// turns. The shift is by `shift` mesh units.
     ///
     /// # Errors
-    /// [`PathError::Direction`], [`PathError::Point`], [`PathError::Angle`] and [`PathError::Shift`] for a number that is
-    /// not finite, a direction of length 0 or an angle beyond 1e9 radians; [`PathError::TooFar`] and [`PathError::Pose`]
+    /// [`PoseError::Direction`], [`PoseError::Point`], [`PoseError::Angle`] and [`PoseError::Shift`] for a number that is
+    /// not finite, a direction of length 0 or an angle beyond 1e9 radians; [`PoseError::ScrewTooFar`] and [`PoseError`]
     /// if the screw takes B farther away than poses may be.
     pub fn screw(
         start: &Pose,
@@ -159,27 +129,27 @@ impl Motion {
         direction: [f64; 3],
         angle: f64,
         shift: f64,
-    ) -> Result<Self, PathError> {
+    ) -> Result<Self, PoseError> {
         let most = direction.iter().fold(0.0f64, |most, value| most.max(value.abs()));
         let length = direction.map(|value| value / most);
         let length = (length[0] * length[0] + length[1] * length[1] + length[2] * length[2]).sqrt();
         if !(most > 0.0 && length.is_finite()) {
-            return Err(PathError::Direction(most));
+            return Err(PoseError::Direction(most));
         }
         if let Some(&found) = point.iter().find(|value| !value.is_finite()) {
-            return Err(PathError::Point(found));
+            return Err(PoseError::Point(found));
         }
         if angle.is_nan() || angle.abs() > 1e9 {
-            return Err(PathError::Angle(angle));
+            return Err(PoseError::Angle(angle));
         }
         if !shift.is_finite() {
-            return Err(PathError::Shift(shift));
+            return Err(PoseError::Shift(shift));
         }
         // On its way, B's origin stays within this of A's origin along each axis.
         let from = start.translation();
         let far = (0..3).map(|k| 2.0 * point[k].abs() + from[k].abs()).sum::<f64>() + shift.abs();
         if far > MAX_COORDINATE {
-            return Err(PathError::TooFar(far));
+            return Err(PoseError::ScrewTooFar(far));
         }
         let mut screw = Self {
             start: *start,
@@ -442,7 +412,7 @@ pub(super) mod tests {
             }
         }
         let half = pose([0.0, 0.0, 1.0], std::f64::consts::PI, [0.0; 3]);
-        assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(PathError::HalfTurn(_))));
+        assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(PoseError::HalfTurn(_))));
         let most = pose([0.0, 0.0, 1.0], 179.9f64.to_radians(), [0.0; 3]);
         let motion = Motion::between(&Pose::IDENTITY, &most).unwrap();
         let middle = pose([0.0, 0.0, 1.0], 89.95f64.to_radians(), [0.0; 3]);

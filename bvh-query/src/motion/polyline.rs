@@ -1,8 +1,8 @@
 //! The path through several poses.
 
-use crate::motion::path::{Motion, PathError, RigidPath, sagitta_of};
+use crate::motion::path::{Motion, RigidPath, sagitta_of};
 use crate::numerics::SLACK;
-use crate::pose::Pose;
+use crate::pose::{Pose, PoseError};
 
 /// A path through several poses. The motion from each pose to the next takes the same share of the time.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,10 +14,10 @@ impl Polyline {
     /// Returns the path through the poses, with [`Motion::between`] from each to the next.
     ///
     /// # Errors
-    /// [`PathError::TooFewPoses`] for fewer than two poses, and the errors of [`Motion::between`].
-    pub fn new(poses: &[Pose]) -> Result<Self, PathError> {
+    /// [`PoseError::TooFewPoses`] for fewer than two poses, and the errors of [`Motion::between`].
+    pub fn new(poses: &[Pose]) -> Result<Self, PoseError> {
         if poses.len() < 2 {
-            return Err(PathError::TooFewPoses(poses.len()));
+            return Err(PoseError::TooFewPoses(poses.len()));
         }
         let motions = poses.windows(2).map(|pair| Motion::between(&pair[0], &pair[1]));
         Ok(Self { motions: motions.collect::<Result<_, _>>()? })

@@ -1,6 +1,6 @@
-//! Why a matrix, a quaternion or a composition is no rigid pose.
+//! Why a matrix, a quaternion or a composition is no rigid pose, and why poses or numbers make no path.
 
-/// Why a matrix is not a rigid placement.
+/// Why a matrix is not a rigid placement, why an instance of a scene cannot have a pose, or why poses or numbers make no path.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
@@ -44,6 +44,36 @@ pub enum PoseError {
     /// The length of a quaternion is not 1.
     #[error("expected a quaternion of length 1, found length {}; normalise it", *.0 as f32)]
     Quaternion(f64),
+    /// The translation of an instance of a scene along an axis.
+    #[error("expected a translation of at most 2^118 along each axis, nearer to the origin, found {0:e}")]
+    TooFarInWorld(f64),
+    /// The largest entry of `R R^T - I` of the rotation of an instance of a scene. [`Pose::nearest`](super::Pose::nearest)
+    /// orthonormalises a rounded rotation.
+    #[error(
+        "expected a rotation within 2^-23 of orthonormal, with more digits or orthonormalised, found {0:e}"
+    )]
+    NotRigidInWorld(f64),
+    /// The poses of a path are half a turn apart, so that neither way round is the shorter one.
+    #[error("expected a turn of less than half a circle, found {0} radians; divide it by a pose between")]
+    HalfTurn(f64),
+    /// The direction of an axis, by its largest component.
+    #[error("direction: expected a finite direction of a length above 0, found {0}")]
+    Direction(f64),
+    /// A coordinate of a point on an axis.
+    #[error("point: expected finite coordinates, found {0}")]
+    Point(f64),
+    /// The angle of a screw, in radians.
+    #[error("angle: expected a finite number of at most 1e9 radians, found {0}")]
+    Angle(f64),
+    /// The shift of a screw.
+    #[error("shift: expected a finite number, found {0}")]
+    Shift(f64),
+    /// How far from A's origin a screw may take B.
+    #[error("point: expected an axis and a shift with which B stays within 2^120, found {0}")]
+    ScrewTooFar(f64),
+    /// A polyline of fewer than two poses.
+    #[error("expected at least two poses, found {0}")]
+    TooFewPoses(usize),
 }
 
 /// Names a number that is not finite.

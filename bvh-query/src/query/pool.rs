@@ -72,8 +72,7 @@ impl Pool {
         mut join: impl FnMut(T),
     ) -> Result<(), (usize, E)> {
         let runs = Runs { count, length, next: AtomicUsize::new(0), end: AtomicUsize::new(usize::MAX) };
-        let results: Vec<Mutex<Option<Result<T, (usize, E)>>>> =
-            (0..runs.number()).map(|_| Mutex::default()).collect();
+        let results: Vec<Mutex<Option<_>>> = (0..runs.number()).map(|_| Mutex::default()).collect();
         self.each_run(threads, &runs, &|querier, number, numbers| {
             let result = run(querier, numbers);
             if let Err((end, _)) = &result {

@@ -6,7 +6,7 @@
 use crate::pose::Pose;
 use crate::scene::contents::Contents;
 use crate::scene::instance::{Attached, Instance, InstanceId};
-use crate::scene::{InstanceError, Scene};
+use crate::scene::{Scene, SceneError};
 
 /// Where an instance comes to be, and the pose that is kept if it is attached.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +57,8 @@ impl Scene {
     /// Cost: some 0.12 us for each instance that moves.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`]; [`InstanceError::Cycle`] if the parent is the child itself or moves with it; and
-    /// [`InstanceError::Pose`] if the child, within rounding, or one that follows it has no valid pose. Then nothing has
+    /// [`SceneError::NoInstance`]; [`SceneError::Cycle`] if the parent is the child itself or moves with it; and
+    /// [`SceneError::Pose`] if the child, within rounding, or one that follows it has no valid pose. Then nothing has
     /// changed.
     ///
     /// ```
@@ -80,7 +80,7 @@ impl Scene {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn attach(&mut self, child: InstanceId, parent: InstanceId) -> Result<(), InstanceError> {
+    pub fn attach(&mut self, child: InstanceId, parent: InstanceId) -> Result<(), SceneError> {
         let kept = self.instance(parent)?.world.kept_of_attached(&self.instance(child)?.world);
         self.attach_at(child, parent, kept)
     }
@@ -90,16 +90,11 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`Scene::attach`].
-    pub fn attach_at(
-        &mut self,
-        child: InstanceId,
-        parent: InstanceId,
-        kept: Pose,
-    ) -> Result<(), InstanceError> {
+    pub fn attach_at(&mut self, child: InstanceId, parent: InstanceId, kept: Pose) -> Result<(), SceneError> {
         let (own, above) = (self.place(child)? as u32, self.place(parent)? as u32);
         if self.contents.moves_with(above, own) {
             let (child, parent) = (self.contents.label(child), self.contents.label(parent));
-            return Err(InstanceError::Cycle { child, parent });
+            return Err(SceneError::Cycle { child, parent });
         }
         let to = Attached { parent: above, kept: kept.to_keep() };
         let before = self.contents_mut().attach(own, Some(to));
@@ -116,8 +111,8 @@ impl Scene {
     /// Detaches an instance from its parent, if it has one. It stays where it is.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn detach(&mut self, child: InstanceId) -> Result<(), InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn detach(&mut self, child: InstanceId) -> Result<(), SceneError> {
         self.place(child)?;
         if self.contents.attached(child.place).is_some() {
             self.contents_mut().attach(child.place, None);
@@ -128,8 +123,8 @@ impl Scene {
     /// Returns the instance that an instance is attached to, if it is, and its pose in the frame of that one.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn parent(&self, child: InstanceId) -> Result<Option<(InstanceId, &Pose)>, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn parent(&self, child: InstanceId) -> Result<Option<(InstanceId, &Pose)>, SceneError> {
         self.place(child)?;
         let attached = self.contents.attached(child.place);
         Ok(attached.and_then(|attached| Some((self.contents.id_at(attached.parent)?, &attached.kept))))
@@ -177,7 +172,7 @@ impl Contents {
 
     /// Returns where instances come to be that are moved to poses in the world, and all that are attached to them. Of two poses
     /// for one, the last counts.
-    pub(super) fn moves(&self, given: &[(u32, Pose)]) -> Result<Vec<Move>, InstanceError> {
+    pub(super) fn moves(&self, given: &[(u32, Pose)]) -> Result<Vec<Move>, SceneError> {
         let mut numbers = Table::new(self.instances.len());
         for (number, (place, _)) in given.iter().enumerate() {
             numbers.set(*place, number);
@@ -194,7 +189,7 @@ impl Contents {
     }
 
     /// Returns where an instance comes to be that was attached, and all that are attached to it.
-    pub(super) fn moves_of(&self, child: u32) -> Result<Vec<Move>, InstanceError> {
+    pub(super) fn moves_of(&self, child: u32) -> Result<Vec<Move>, SceneError> {
         let mut moves = Vec::new();
         self.follow(child, &[], &Table::new(0), &mut moves)?;
         Ok(moves)
@@ -207,7 +202,7 @@ impl Contents {
         given: &[(u32, Pose)],
         numbers: &Table,
         moves: &mut Vec<Move>,
-    ) -> Result<(), InstanceError> {
+    ) -> Result<(), SceneError> {
         let above = self.attached(first).and_then(|attached| self.at(attached.parent));
         let mut open = vec![(first, above.map_or(Pose::IDENTITY, |parent| parent.world))];
         while let Some((place, parent)) = open.pop() {

@@ -2,11 +2,11 @@
 //! it until one of them changes. Places given here are those of instances, unless it says otherwise.
 
 use crate::file::files::SceneShape;
-use crate::pose::Pose;
+use crate::pose::{Pose, PoseError};
 use crate::scene::broad_phase::BroadPhase;
 use crate::scene::groups::Groups;
 use crate::scene::instance::{Instance, InstanceId};
-use crate::scene::{InstanceError, InstanceLabel, WorldPoseError};
+use crate::scene::{InstanceLabel, SceneError};
 use bvh_format::instances::{MAX_RIGID_ERROR, MAX_WORLD, departure};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -52,9 +52,9 @@ impl Contents {
         Some(self.at(place)?.id(place))
     }
 
-    pub(super) fn instance(&self, id: InstanceId) -> Result<&Instance, InstanceError> {
+    pub(super) fn instance(&self, id: InstanceId) -> Result<&Instance, SceneError> {
         let instance = self.at(id.place).filter(|instance| instance.generation == id.generation);
-        instance.ok_or(InstanceError::NoInstance(id))
+        instance.ok_or(SceneError::NoInstance(id))
     }
 
     /// Names an instance for an error.
@@ -64,9 +64,9 @@ impl Contents {
     }
 
     /// Refuses a pose of an instance with which a pair may have no relative pose.
-    pub(super) fn check_pose(&self, id: InstanceId, world: &Pose) -> Result<(), InstanceError> {
+    pub(super) fn check_pose(&self, id: InstanceId, world: &Pose) -> Result<(), SceneError> {
         self.instance(id)?;
-        check_world(world).map_err(|source| InstanceError::Pose { instance: self.label(id), source })
+        check_world(world).map_err(|source| SceneError::Pose { instance: self.label(id), source })
     }
 
     /// Returns the identifier that the next instance gets.
@@ -205,12 +205,12 @@ pub(super) fn reach_of(pair_margin: f64) -> f64 {
 }
 
 /// Refuses a pose with which a pair may have no relative pose.
-pub(super) fn check_world(world: &Pose) -> Result<(), WorldPoseError> {
+pub(super) fn check_world(world: &Pose) -> Result<(), PoseError> {
     let far = world.translation().into_iter().find(|t| t.abs() > MAX_WORLD);
     let error = departure(world.rotation(), 1.0);
     match far {
-        Some(far) => Err(WorldPoseError::TooFar(far)),
-        None if error > MAX_RIGID_ERROR => Err(WorldPoseError::NotRigid(error)),
+        Some(far) => Err(PoseError::TooFarInWorld(far)),
+        None if error > MAX_RIGID_ERROR => Err(PoseError::NotRigidInWorld(error)),
         None => Ok(()),
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::error::QueryError;
 use crate::isa::BackendError;
+use crate::pose::PoseError;
 use crate::scene::instance::InstanceId;
-use bvh_format::FormatError;
 use std::fmt;
 
 /// The instance that an error is about. It is shown by its name or, without one, by its identifier.
@@ -24,27 +24,39 @@ impl fmt::Display for InstanceLabel {
     }
 }
 
-/// Why a file makes no scene.
+/// Why a file makes no scene, why a scene refuses an instance or a change of it, or why a question about it has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum SceneFileError {
+pub enum SceneError {
+    /// The question about a pair has no answer.
+    #[error("instances {a} and {b}: {source}")]
+    Pair {
+        /// The instance A.
+        a: InstanceLabel,
+        /// The instance B.
+        b: InstanceLabel,
+        /// Why.
+        source: QueryError,
+    },
+    /// The question about an instance has no answer.
+    #[error("instance {instance}: {source}")]
+    Instance {
+        /// The instance.
+        instance: InstanceLabel,
+        /// Why.
+        source: QueryError,
+    },
+    /// The question as a whole has no answer, or what a file says of its instances breaks a rule of the format.
+    #[error(transparent)]
+    Query(#[from] QueryError),
     /// A file without instances: it says nothing of a world.
     #[error(
         "expected a scene, a file with instances, found none; add its objects to a scene, or bake it as one"
     )]
     NoInstances,
-    /// What the file says of its instances breaks a rule of the format.
-    #[error(transparent)]
-    Damaged(#[from] FormatError),
     /// `CBVH_ISA` names no backend, or one that the CPU lacks.
     #[error(transparent)]
     Backend(#[from] BackendError),
-}
-
-/// Why a scene refuses an instance or a change of it, or has nothing to tell of it.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum InstanceError {
     /// The scene never had this instance, or it has been removed.
     #[error("instance {0}: expected an instance of the scene, found none; was it removed?")]
     NoInstance(InstanceId),
@@ -68,50 +80,6 @@ pub enum InstanceError {
         /// The instance.
         instance: InstanceLabel,
         /// What is wrong with the pose.
-        source: WorldPoseError,
+        source: PoseError,
     },
-}
-
-/// Why a pose is none that an instance of a scene may have.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum WorldPoseError {
-    /// The translation along an axis.
-    #[error("expected a translation of at most 2^118 along each axis, nearer to the origin, found {0:e}")]
-    TooFar(f64),
-    /// The largest entry of `R R^T - I`. [`Pose::nearest`](crate::Pose::nearest) orthonormalises a rounded rotation.
-    #[error(
-        "expected a rotation within 2^-23 of orthonormal, with more digits or orthonormalised, found {0:e}"
-    )]
-    NotRigid(f64),
-}
-
-/// Why a question about a scene has no answer.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// The question about a pair has no answer.
-    #[error("instances {a} and {b}: {source}")]
-    Pair {
-        /// The instance A.
-        a: InstanceLabel,
-        /// The instance B.
-        b: InstanceLabel,
-        /// Why.
-        source: QueryError,
-    },
-    /// The question about an instance has no answer.
-    #[error("instance {instance}: {source}")]
-    Instance {
-        /// The instance.
-        instance: InstanceLabel,
-        /// Why.
-        source: QueryError,
-    },
-    /// The question as a whole has no answer.
-    #[error(transparent)]
-    Query(#[from] QueryError),
-    /// The scene does not have the instance of a path, or refuses where the path starts or ends.
-    #[error(transparent)]
-    Refused(#[from] InstanceError),
 }

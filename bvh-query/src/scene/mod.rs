@@ -19,13 +19,14 @@ mod trackers;
 mod workers;
 mod world_box;
 
-pub use error::{InstanceError, InstanceLabel, SceneError, SceneFileError, WorldPoseError};
+pub use error::{InstanceLabel, SceneError};
 pub use groups::Groups;
 pub use instance::InstanceId;
 pub use motions::SceneMotionAnswer;
 pub use pair_questions::{SceneClash, SceneContact, SceneDistance, ScenePair};
 pub use probes::{SceneClosestPoint, SceneRayHit};
 
+use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::files::SceneShape;
 use crate::file::owned_shape::OwnedShape;
@@ -179,9 +180,9 @@ impl Scene {
     /// needs it.
     ///
     /// # Errors
-    /// [`SceneFileError::NoInstances`] if the file has no instances; [`SceneFileError::Damaged`] if its instances break
-    /// a rule of the format; [`SceneFileError::Backend`] as for [`Scene::new`].
-    pub fn of_file(bvh: Bvh) -> Result<Self, SceneFileError> {
+    /// [`SceneError::NoInstances`] if the file has no instances; [`SceneError::Query`] if its instances break
+    /// a rule of the format; [`SceneError::Backend`] as for [`Scene::new`].
+    pub fn of_file(bvh: Bvh) -> Result<Self, SceneError> {
         Self::of_file_with_backend(bvh, Backend::detect()?)
     }
 
@@ -190,10 +191,10 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`Scene::of_file`], except those of the backend.
-    pub fn of_file_with_backend(bvh: Bvh, backend: Backend) -> Result<Self, SceneFileError> {
-        let instances = bvh.layout().read_instances(bvh.bytes())?;
+    pub fn of_file_with_backend(bvh: Bvh, backend: Backend) -> Result<Self, SceneError> {
+        let instances = bvh.layout().read_instances(bvh.bytes()).map_err(QueryError::from)?;
         if instances.is_empty() {
-            return Err(SceneFileError::NoInstances);
+            return Err(SceneError::NoInstances);
         }
         let mut scene = Self::with_backend(backend);
         for instance in instances {
@@ -252,23 +253,23 @@ impl Scene {
     /// Adds an instance. It is in all groups, and no other instance is allowed to touch it.
     ///
     /// # Errors
-    /// [`InstanceError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an
+    /// [`SceneError::Pose`] if the rotation is not rigid to within 2^-23 or the translation exceeds 2^118 along an
     /// axis: within these limits every pair of instances has a relative pose. [`Pose::nearest`] orthonormalises a
     /// rotation.
-    pub fn add(&mut self, shape: impl Into<SceneShape>, world: Pose) -> Result<InstanceId, InstanceError> {
+    pub fn add(&mut self, shape: impl Into<SceneShape>, world: Pose) -> Result<InstanceId, SceneError> {
         self.add_checked(None, shape.into(), world)
     }
 
     /// Adds an instance with a name of its own.
     ///
     /// # Errors
-    /// [`InstanceError::NameTaken`] if another instance has the name, and the errors of [`Scene::add`].
+    /// [`SceneError::NameTaken`] if another instance has the name, and the errors of [`Scene::add`].
     pub fn add_named(
         &mut self,
         name: impl Into<String>,
         shape: impl Into<SceneShape>,
         world: Pose,
-    ) -> Result<InstanceId, InstanceError> {
+    ) -> Result<InstanceId, SceneError> {
         self.add_checked(Some(name.into()), shape.into(), world)
     }
 
@@ -277,13 +278,13 @@ impl Scene {
         name: Option<String>,
         shape: SceneShape,
         world: Pose,
-    ) -> Result<InstanceId, InstanceError> {
+    ) -> Result<InstanceId, SceneError> {
         if let Err(source) = check_world(&world) {
             let instance = InstanceLabel { id: self.contents.next_id(), name: name.map(Box::from) };
-            return Err(InstanceError::Pose { instance, source });
+            return Err(SceneError::Pose { instance, source });
         }
         match name {
-            Some(name) if self.find(&name).is_some() => Err(InstanceError::NameTaken(name)),
+            Some(name) if self.find(&name).is_some() => Err(SceneError::NameTaken(name)),
             name => Ok(self.contents_mut().insert(name, shape, world, Groups::ALL)),
         }
     }
@@ -292,8 +293,8 @@ impl Scene {
     /// and are no longer attached.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`] if the scene never had such an instance, or no longer has it.
-    pub fn remove(&mut self, id: InstanceId) -> Result<(), InstanceError> {
+    /// [`SceneError::NoInstance`] if the scene never had such an instance, or no longer has it.
+    pub fn remove(&mut self, id: InstanceId) -> Result<(), SceneError> {
         self.place(id)?;
         self.contents_mut().remove(id.place);
         self.likely = self.likely.filter(|&(a, b)| a != id.place && b != id.place);
@@ -306,8 +307,8 @@ impl Scene {
     /// Cost: some 0.1 us. Baking the shape takes longer, and needs no scene.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn set_shape(&mut self, id: InstanceId, shape: impl Into<SceneShape>) -> Result<(), InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn set_shape(&mut self, id: InstanceId, shape: impl Into<SceneShape>) -> Result<(), SceneError> {
         self.change(id, |instance| instance.set_shape(shape.into()))
     }
 
@@ -315,9 +316,9 @@ impl Scene {
     /// its parent, and follows it from there: see [`Scene::attach`].
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`], or [`InstanceError::Pose`] as for [`Scene::add`], also for a pose to which an
+    /// [`SceneError::NoInstance`], or [`SceneError::Pose`] as for [`Scene::add`], also for a pose to which an
     /// attached instance would follow. Then nothing has moved.
-    pub fn set_pose(&mut self, id: InstanceId, world: Pose) -> Result<(), InstanceError> {
+    pub fn set_pose(&mut self, id: InstanceId, world: Pose) -> Result<(), SceneError> {
         self.contents.check_pose(id, &world)?;
         self.move_to(&[(id.place, world)])
     }
@@ -330,7 +331,7 @@ impl Scene {
     pub fn set_poses(
         &mut self,
         poses: impl IntoIterator<Item = (InstanceId, Pose)>,
-    ) -> Result<(), InstanceError> {
+    ) -> Result<(), SceneError> {
         let mut moved = std::mem::take(&mut self.moved);
         moved.clear();
         for (id, world) in poses {
@@ -343,7 +344,7 @@ impl Scene {
     }
 
     /// Moves the instances in some places to poses that are valid.
-    fn move_to(&mut self, poses: &[(u32, Pose)]) -> Result<(), InstanceError> {
+    fn move_to(&mut self, poses: &[(u32, Pose)]) -> Result<(), SceneError> {
         if self.contents.move_alone(poses.iter().map(|&(place, _)| place)) {
             self.contents_mut().change_each(poses.iter().copied(), |instance, world| instance.world = world);
         } else {
@@ -369,8 +370,8 @@ impl Scene {
     /// first. What is attached to the instance has a margin of its own.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`], or [`InstanceError::Margin`] for a margin that is negative, NaN or above 2^118.
-    pub fn set_margin(&mut self, id: InstanceId, margin: f64) -> Result<(), InstanceError> {
+    /// [`SceneError::NoInstance`], or [`SceneError::Margin`] for a margin that is negative, NaN or above 2^118.
+    pub fn set_margin(&mut self, id: InstanceId, margin: f64) -> Result<(), SceneError> {
         self.place(id)?;
         check_margin(margin)?;
         self.change(id, |instance| instance.margin = margin)
@@ -381,12 +382,7 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of [`Scene::set_margin`].
-    pub fn set_pair_margin(
-        &mut self,
-        a: InstanceId,
-        b: InstanceId,
-        margin: f64,
-    ) -> Result<(), InstanceError> {
+    pub fn set_pair_margin(&mut self, a: InstanceId, b: InstanceId, margin: f64) -> Result<(), SceneError> {
         let (a, b) = (self.place(a)? as u32, self.place(b)? as u32);
         check_margin(margin)?;
         self.contents_mut().set_pair_margin((a.min(b), a.max(b)), margin);
@@ -396,16 +392,16 @@ impl Scene {
     /// Returns the margin of an instance.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn margin(&self, id: InstanceId) -> Result<f64, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn margin(&self, id: InstanceId) -> Result<f64, SceneError> {
         Ok(self.instance(id)?.margin)
     }
 
     /// Returns the margin that a pair has of its own.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn pair_margin(&self, a: InstanceId, b: InstanceId) -> Result<f64, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn pair_margin(&self, a: InstanceId, b: InstanceId) -> Result<f64, SceneError> {
         Ok(self.contents.margin_of_pair(self.place(a)? as u32, self.place(b)? as u32))
     }
 
@@ -422,8 +418,8 @@ impl Scene {
     /// Puts an instance into groups.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn set_groups(&mut self, id: InstanceId, groups: Groups) -> Result<(), InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn set_groups(&mut self, id: InstanceId, groups: Groups) -> Result<(), SceneError> {
         self.place(id)?;
         self.contents_mut().set_groups(id.place, groups);
         Ok(())
@@ -433,8 +429,8 @@ impl Scene {
     /// or a part and its gripper.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn set_allowed(&mut self, a: InstanceId, b: InstanceId, allowed: bool) -> Result<(), InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn set_allowed(&mut self, a: InstanceId, b: InstanceId, allowed: bool) -> Result<(), SceneError> {
         for id in [a, b] {
             self.place(id)?;
         }
@@ -450,32 +446,32 @@ impl Scene {
     /// Returns the name of an instance, if it has one.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn name(&self, id: InstanceId) -> Result<Option<&str>, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn name(&self, id: InstanceId) -> Result<Option<&str>, SceneError> {
         Ok(self.instance(id)?.name.as_deref())
     }
 
     /// Returns the shape of an instance.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn shape(&self, id: InstanceId) -> Result<&SceneShape, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn shape(&self, id: InstanceId) -> Result<&SceneShape, SceneError> {
         Ok(&self.instance(id)?.shape)
     }
 
     /// Returns the pose of an instance in the world.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn pose(&self, id: InstanceId) -> Result<&Pose, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn pose(&self, id: InstanceId) -> Result<&Pose, SceneError> {
         Ok(&self.instance(id)?.world)
     }
 
     /// Returns the groups of an instance.
     ///
     /// # Errors
-    /// [`InstanceError::NoInstance`].
-    pub fn groups(&self, id: InstanceId) -> Result<Groups, InstanceError> {
+    /// [`SceneError::NoInstance`].
+    pub fn groups(&self, id: InstanceId) -> Result<Groups, SceneError> {
         Ok(self.instance(id)?.groups)
     }
 
@@ -513,11 +509,11 @@ impl Scene {
         self.pairs_asked
     }
 
-    fn instance(&self, id: InstanceId) -> Result<&Instance, InstanceError> {
+    fn instance(&self, id: InstanceId) -> Result<&Instance, SceneError> {
         self.contents.instance(id)
     }
 
-    fn place(&self, id: InstanceId) -> Result<usize, InstanceError> {
+    fn place(&self, id: InstanceId) -> Result<usize, SceneError> {
         self.instance(id).map(|_| id.place as usize)
     }
 
@@ -529,7 +525,7 @@ impl Scene {
     }
 
     /// Changes an instance that exists, and its box.
-    fn change(&mut self, id: InstanceId, change: impl FnOnce(&mut Instance)) -> Result<(), InstanceError> {
+    fn change(&mut self, id: InstanceId, change: impl FnOnce(&mut Instance)) -> Result<(), SceneError> {
         self.place(id)?;
         self.contents_mut().change(id.place, change);
         Ok(())
@@ -552,6 +548,6 @@ impl Scene {
 }
 
 /// Refuses an invalid margin.
-fn check_margin(margin: f64) -> Result<(), InstanceError> {
-    check_radius(margin).map_err(|_| InstanceError::Margin(margin))
+fn check_margin(margin: f64) -> Result<(), SceneError> {
+    check_radius(margin).map_err(|_| SceneError::Margin(margin))
 }

@@ -121,7 +121,7 @@ impl Scene {
     /// instance: then a pair takes one query about contact.
     ///
     /// # Errors
-    /// [`SceneError::Refused`] for an identifier of no instance, and for a start or an end of a path that
+    /// [`SceneError::NoInstance`] for an identifier of no instance, [`SceneError::Pose`] for a start or an end of a path that
     /// [`Scene::set_pose`] refuses; [`SceneError::Query`] for an invalid clearance or tolerance; and
     /// [`SceneError::Pair`] with the first pair whose question has no answer before the earliest hit.
     pub fn motion(

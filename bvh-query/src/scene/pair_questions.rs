@@ -102,7 +102,7 @@ impl InstancePair<'_> {
 }
 
 /// Takes some near pairs of a scene, and breaks where no more are wanted.
-type VisitPairs<'a> = &'a mut dyn FnMut(&mut Scene, Vec<NearPair>) -> Result<ControlFlow<()>, SceneError>;
+type VisitNearPairs<'a> = &'a mut dyn FnMut(&mut Scene, Vec<NearPair>) -> Result<ControlFlow<()>, SceneError>;
 
 /// Sorts near pairs by the gaps of their boxes.
 fn nearest_first(near_pairs: &mut [NearPair]) {
@@ -395,7 +395,7 @@ impl Scene {
 
     /// Starts a question, and calls `visit` with the tested pairs whose boxes are at most `limit` apart, until `visit`
     /// breaks. The pairs come in ascending order, in several calls if there are many.
-    fn each_piece(&mut self, limit: f64, visit: VisitPairs<'_>) -> Result<(), SceneError> {
+    fn each_piece(&mut self, limit: f64, visit: VisitNearPairs<'_>) -> Result<(), SceneError> {
         self.start();
         let mut next = Next::All;
         while let Some(mut near_pairs) = self.next_piece(&mut next, limit)? {

@@ -58,7 +58,7 @@ impl Scene {
         within: f64,
     ) -> Result<Vec<Option<SceneClosestPoint>>, SceneError> {
         check_within(within)?;
-        self.each_probe(points, |asked, point| asked.closest_point(&check_point(point)?, within))
+        self.each_probe(points, |search, point| search.closest_point(&check_point(point)?, within))
     }
 
     /// Returns on which side of the instances each of many points in the world is. It is inside if it is inside any
@@ -68,7 +68,7 @@ impl Scene {
     /// # Errors
     /// The errors of [`Scene::closest_points`] and of [`Querier::side`].
     pub fn sides(&mut self, points: &[[f64; 3]]) -> Result<Vec<Side>, SceneError> {
-        self.each_probe(points, |asked, point| asked.side(&check_point(point)?))
+        self.each_probe(points, |search, point| search.side(&check_point(point)?))
     }
 
     /// Returns the closest points and the sides of many points: see [`Scene::closest_points`] and [`Scene::sides`].
@@ -81,12 +81,12 @@ impl Scene {
         within: f64,
     ) -> Result<Vec<Option<(InstanceId, SignedDistance)>>, SceneError> {
         check_within(within)?;
-        self.each_probe(points, |asked, point| {
+        self.each_probe(points, |search, point| {
             let point = check_point(point)?;
-            let Some(SceneClosestPoint { instance, closest }) = asked.closest_point(&point, within)? else {
+            let Some(SceneClosestPoint { instance, closest }) = search.closest_point(&point, within)? else {
                 return Ok(None);
             };
-            let side = asked.side(&point)?;
+            let side = search.side(&point)?;
             Ok(Some((instance, SignedDistance { side, closest })))
         })
     }
@@ -97,10 +97,10 @@ impl Scene {
     /// [`SceneError::Query`] for a ray that [`Querier::first_hit`] refuses, and [`SceneError::Instance`] with an
     /// instance whose question has no answer. If several rays fail, the error is that of the first.
     pub fn first_hits(&mut self, rays: &[Ray]) -> Result<Vec<Option<SceneRayHit>>, SceneError> {
-        self.each_probe(rays, |asked, ray| {
+        self.each_probe(rays, |search, ray| {
             let mut first = First::new(ray)?;
-            asked.line(&mut first)?;
-            Ok(first.hit().map(|(instance, hit)| asked.hit(instance, hit)))
+            search.line(&mut first)?;
+            Ok(first.hit().map(|(instance, hit)| search.hit(instance, hit)))
         })
     }
 
@@ -109,9 +109,9 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::first_hits`].
     pub fn any_hits(&mut self, rays: &[Ray]) -> Result<Vec<bool>, SceneError> {
-        self.each_probe(rays, |asked, ray| {
+        self.each_probe(rays, |search, ray| {
             let mut any = Any::new(ray)?;
-            asked.line(&mut any)?;
+            search.line(&mut any)?;
             Ok(any.found)
         })
     }
@@ -122,10 +122,10 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::first_hits`].
     pub fn all_hits(&mut self, rays: &[Ray]) -> Result<Vec<Vec<SceneRayHit>>, SceneError> {
-        self.each_probe(rays, |asked, ray| {
+        self.each_probe(rays, |search, ray| {
             let mut all = All::new(ray)?;
-            asked.line(&mut all)?;
-            Ok(all.hits().map(|(instance, hit)| asked.hit(instance, hit)).collect())
+            search.line(&mut all)?;
+            Ok(all.hits().map(|(instance, hit)| search.hit(instance, hit)).collect())
         })
     }
 
@@ -135,9 +135,9 @@ impl Scene {
     /// [`SceneError::Query`] for ends that [`Querier::segment_hit`] refuses, and [`SceneError::Instance`] with an
     /// instance whose question has no answer. If several segments fail, the error is that of the first.
     pub fn segment_hits(&mut self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, SceneError> {
-        self.each_probe(segments, |asked, [from, to]| {
+        self.each_probe(segments, |search, [from, to]| {
             let mut question = MeetsSegment::new(*from, *to)?;
-            asked.line(&mut question)?;
+            search.line(&mut question)?;
             Ok(question.met)
         })
     }
@@ -146,27 +146,27 @@ impl Scene {
     fn each_probe<P: Sync, R: Send>(
         &mut self,
         probes: &[P],
-        ask: impl Fn(&mut Asked<'_>, &P) -> Result<R, SceneError> + Sync,
+        ask: impl Fn(&mut ProbeSearch<'_>, &P) -> Result<R, SceneError> + Sync,
     ) -> Result<Vec<R>, SceneError> {
         self.start();
         let mut stats = QueryStats::default();
         let scene = &*self;
         let answers = scene.workers.each(probes, &mut stats, |querier, probe| {
             querier.start();
-            Ok(Some(ask(&mut Asked { scene, querier }, probe)))
+            Ok(Some(ask(&mut ProbeSearch { scene, querier }, probe)))
         });
         self.stats = stats;
         answers.map_err(|(_, error)| SceneError::Query(error))?.into_iter().collect()
     }
 }
 
-/// A question about a probe to a whole scene.
-struct Asked<'a> {
+/// The search of a whole scene for the answer about one probe.
+struct ProbeSearch<'a> {
     scene: &'a Scene,
     querier: &'a mut Querier,
 }
 
-impl Asked<'_> {
+impl ProbeSearch<'_> {
     fn closest_point(&mut self, point: &Point, within: f64) -> Result<Option<SceneClosestPoint>, SceneError> {
         let mut best: Option<SceneClosestPoint> = None;
         let (mut limit, mut lower) = (within, f64::INFINITY);

@@ -6,7 +6,7 @@ use crate::common::{
 };
 use bvh_bake::mesh::Mesh;
 use bvh_query::{
-    Bvh, Motion, MotionAnswer, MotionOptions, NumberError, PathError, Polyline, Pose, Querier, QueryError,
+    Bvh, Motion, MotionAnswer, MotionOptions, NumberError, Polyline, Pose, PoseError, Querier, QueryError,
     RelativePath, RigidPath, displacement, path_reach,
 };
 use cbvh_testkit::depth::rounds;
@@ -518,7 +518,7 @@ fn numbers_that_mean_nothing_are_refused() {
     let answer = querier.motion(&block, &block, &motion, &MotionOptions::new());
     assert_eq!(answer, Err(QueryError::Budget { visits: 10 }));
     let half = Pose::from_quaternion([0.0, 0.0, 1.0, 0.0], [0.0; 3]).unwrap();
-    assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(PathError::HalfTurn(_))));
+    assert!(matches!(Motion::between(&Pose::IDENTITY, &half), Err(PoseError::HalfTurn(_))));
 }
 
 /// At a time without a relative pose, neither a hit nor a free path is certain.

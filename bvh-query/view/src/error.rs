@@ -1,7 +1,7 @@
 //! Why there is no page.
 
 use crate::MAX_FILE_BYTES;
-use bvh_query::{InstanceError, PathError, QueryError};
+use bvh_query::{PoseError, QueryError, SceneError};
 
 /// Why a page cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -57,11 +57,11 @@ pub enum PageError {
     },
     /// No motion leads from one pose to the other.
     #[error("motion: {0}")]
-    Motion(#[from] PathError),
+    Motion(#[from] PoseError),
     /// The file of a shape is not there, or has changed.
     #[error(transparent)]
     Shape(#[from] QueryError),
     /// An instance is not in its scene.
     #[error(transparent)]
-    NotInScene(#[from] InstanceError),
+    NotInScene(#[from] SceneError),
 }

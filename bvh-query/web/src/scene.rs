@@ -3,9 +3,7 @@
 use crate::answers;
 use crate::arguments::{Answer, bytes, integers, pose_or_identity, poses, refused, same_count, wrong};
 use crate::mesh::Mesh;
-use bvh_query::{
-    Bvh, Groups, InstanceError, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair,
-};
+use bvh_query::{Bvh, Groups, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair};
 use js_sys::{Array, Float64Array, Uint8Array, Uint32Array};
 use std::collections::HashMap;
 use wasm_bindgen::prelude::*;
@@ -65,10 +63,10 @@ impl Scene {
             SceneError::Instance { instance, source } => {
                 wrong(&format!("instance {}", self.called(&instance)), source)
             }
-            SceneError::Refused(InstanceError::Pose { instance, source }) => {
+            SceneError::Pose { instance, source } => {
                 wrong(&format!("instance {}", self.called(&instance)), source)
             }
-            SceneError::Refused(InstanceError::Cycle { child, parent }) => {
+            SceneError::Cycle { child, parent } => {
                 let found = format!(
                     "expected one that does not move with {}, found {}",
                     self.called(&child),
@@ -127,7 +125,7 @@ impl Scene {
         };
         let id = added.map_err(|error| match error {
             // The instance has no number yet.
-            InstanceError::Pose { source, .. } => wrong("pose", source),
+            SceneError::Pose { source, .. } => wrong("pose", source),
             error => refused(error),
         })?;
         // This does not fail: the instance is there.

@@ -9,7 +9,7 @@ use bvh_bake::input::{MeshFormat, read_bytes};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{BakeError, shapes, to_bytes};
 use bvh_query::{
-    Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, QueryError, ReadAhead, Scene, SceneFileError,
+    Backend, Bvh, Groups, InstanceId, OwnedShape, Pose, QueryError, ReadAhead, Scene, SceneError,
 };
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -281,7 +281,7 @@ pub(crate) fn open(path: &Path, backend: Backend) -> Result<LoadedScene, Failure
     bvh.validate().map_err(|error| Failure::invalid(path, error))?;
     let scene = Scene::of_file_with_backend(bvh.clone(), backend);
     let scene = scene.map_err(|error| match error {
-        SceneFileError::NoInstances => Failure::invalid(path, format_args!("{error}: cbvh bake --scene")),
+        SceneError::NoInstances => Failure::invalid(path, format_args!("{error}: cbvh bake --scene")),
         error => Failure::invalid(path, error),
     })?;
     Ok(LoadedScene {

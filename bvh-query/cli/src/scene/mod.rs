@@ -8,8 +8,7 @@ use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure};
 use crate::options::not_negative;
 use bvh_query::{
-    Backend, InstanceError, OwnedShape, Pose, Querier, QueryError, Relation, Scene, SceneDistance,
-    SceneError, ScenePair,
+    Backend, OwnedShape, Pose, Querier, QueryError, Relation, Scene, SceneDistance, SceneError, ScenePair,
 };
 use clap::{Args, ValueEnum};
 use file::{Frame, LoadedScene};
@@ -246,7 +245,7 @@ fn blame(error: &SceneError, frame: &Frame, arguments: &SceneArguments) -> Failu
         SceneError::Pair { source: QueryError::Budget { .. }, .. } => {
             Failure::Limit(format!("frame {number}: {error}"))
         }
-        SceneError::Refused(InstanceError::Pose { .. }) => {
+        SceneError::Pose { .. } => {
             let frames = arguments.frames.as_ref().unwrap_or(&arguments.scene);
             Failure::invalid(frames, format_args!("line {line}: {error}"))
         }

@@ -4,8 +4,8 @@ use super::{Answers, ask, place, scenes, shape, shapes};
 use crate::common::shapes::{cube, plate, sphere, torus};
 use crate::common::{Random, random_pose, translation as at};
 use bvh_query::{
-    InstanceError, InstanceId, Motion, MotionOptions, OwnedShape, Pose, Ray, RigidPath, Scene, SceneError,
-    SceneMotionAnswer, WorldPoseError,
+    InstanceId, Motion, MotionOptions, OwnedShape, Pose, PoseError, Ray, RigidPath, Scene, SceneError,
+    SceneMotionAnswer,
 };
 use cbvh_testkit::depth::rounds;
 use std::collections::BTreeMap;
@@ -170,7 +170,7 @@ fn cycles_and_strangers_are_refused_and_change_nothing() {
         let expected =
             format!("instance {child}: expected a parent that does not move with it, found {parent}");
         assert_eq!(error.to_string(), expected);
-        assert!(matches!(error, InstanceError::Cycle { .. }));
+        assert!(matches!(error, SceneError::Cycle { .. }));
     }
     let gone = scene.add(block.clone(), Pose::IDENTITY).unwrap();
     scene.remove(gone).unwrap();
@@ -181,7 +181,7 @@ fn cycles_and_strangers_are_refused_and_change_nothing() {
         scene.set_shape(gone, block.clone()),
         scene.parent(gone).map(drop),
     ] {
-        assert_eq!(refused, Err(InstanceError::NoInstance(gone)));
+        assert_eq!(refused, Err(SceneError::NoInstance(gone)));
     }
     let parents = |scene: &Scene| {
         ids.iter().map(|&id| scene.parent(id).unwrap().map(|(parent, _)| parent)).collect::<Vec<_>>()
@@ -220,15 +220,13 @@ fn a_pose_out_of_range_moves_nobody() {
         [vec![(ids[0], at(far, 0.0, 0.0))], vec![(ids[2], Pose::IDENTITY), (ids[0], at(far, 0.0, 0.0))]]
     {
         let error = scene.set_poses(poses).unwrap_err();
-        let InstanceError::Pose { instance, source } = error else { panic!("{error}") };
-        assert_eq!((instance.id, source), (ids[1], WorldPoseError::TooFar(1.75 * far)));
+        let SceneError::Pose { instance, source } = error else { panic!("{error}") };
+        assert_eq!((instance.id, source), (ids[1], PoseError::TooFarInWorld(1.75 * far)));
         assert_eq!(ids.map(|id| *scene.pose(id).unwrap()), before);
     }
     let through = Motion::between(&Pose::IDENTITY, &at(far, 0.0, 0.0)).unwrap();
     let error = scene.motion(&[(ids[0], &through)], &MotionOptions::new()).unwrap_err();
-    assert!(
-        matches!(&error, SceneError::Refused(InstanceError::Pose { instance, .. }) if instance.id == ids[1])
-    );
+    assert!(matches!(&error, SceneError::Pose { instance, .. } if instance.id == ids[1]));
     // What is kept is still the same.
     scene.set_pose(ids[0], at(0.0, 4.0, 0.0)).unwrap();
     assert_eq!(scene.pose(ids[1]), Ok(&at(0.75 * far, 4.0, 0.0)));

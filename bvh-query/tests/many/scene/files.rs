@@ -2,9 +2,7 @@
 
 use super::{Random, ask, place, shape, shapes};
 use crate::common::shapes::sphere;
-use bvh_query::{
-    Bvh, FileChange, Files, Groups, OwnedShape, Pose, QueryError, Rule, Scene, SceneError, SceneFileError,
-};
+use bvh_query::{Bvh, FileChange, Files, Groups, OwnedShape, Pose, QueryError, Rule, Scene, SceneError};
 use std::path::{Path, PathBuf};
 
 /// Writes a file of its own for each shape, and returns the folder and the paths.
@@ -45,7 +43,7 @@ fn a_scene_file_is_the_scene_of_its_instances() {
     assert_eq!(opened.distance().unwrap().unwrap().nearest.distance, 0.0);
 
     let plain = path.with_file_name("ok-plain.cbvh");
-    assert_eq!(Scene::of_file(Bvh::read(plain).unwrap()).unwrap_err(), SceneFileError::NoInstances);
+    assert_eq!(Scene::of_file(Bvh::read(plain).unwrap()).unwrap_err(), SceneError::NoInstances);
     for (bad, rule) in [
         ("R40-no-instances", "R40"),
         ("R41-object-1", "R41"),

@@ -5,8 +5,8 @@ use super::{scenes, shape};
 use crate::common::shapes::{cube, outward, plate, sphere, torus};
 use crate::common::{Random, random_pose};
 use bvh_query::{
-    InstanceError, InstanceId, Motion, MotionAnswer, MotionOptions, OwnedShape, Pose, Querier, Ray, Relation,
-    RelativePath, RigidPath, Scene, SceneMotionAnswer, Side,
+    InstanceId, Motion, MotionAnswer, MotionOptions, OwnedShape, Pose, Querier, Ray, Relation, RelativePath,
+    RigidPath, Scene, SceneError, SceneMotionAnswer, Side,
 };
 use cbvh_testkit::depth::rounds;
 use std::collections::HashMap;
@@ -237,13 +237,13 @@ fn wrong_margins_are_refused_and_change_nothing() {
     let b = scene.add(shape(&cube()), Pose::IDENTITY).unwrap();
     scene.set_margin(a, 1.0).unwrap();
     for wrong in [-1.0, f64::NAN, f64::INFINITY, f64::MAX] {
-        assert!(matches!(scene.set_margin(a, wrong), Err(InstanceError::Margin(_))));
-        assert!(matches!(scene.set_pair_margin(a, b, wrong), Err(InstanceError::Margin(_))));
+        assert!(matches!(scene.set_margin(a, wrong), Err(SceneError::Margin(_))));
+        assert!(matches!(scene.set_pair_margin(a, b, wrong), Err(SceneError::Margin(_))));
     }
     assert_eq!((scene.margin(a), scene.pair_margin(a, b)), (Ok(1.0), Ok(0.0)));
     scene.set_pair_margin(a, b, 3.0).unwrap();
     scene.remove(b).unwrap();
     let c = scene.add(shape(&cube()), Pose::IDENTITY).unwrap();
     assert_eq!(scene.pair_margin(a, c), Ok(0.0), "a margin of a pair goes with its instances");
-    assert!(matches!(scene.set_margin(b, 1.0), Err(InstanceError::NoInstance(_))));
+    assert!(matches!(scene.set_margin(b, 1.0), Err(SceneError::NoInstance(_))));
 }

@@ -12,8 +12,8 @@ mod trackers;
 use crate::common::shapes::{cube, moved, plate, sphere, torus};
 use crate::common::{Random, Triangle, backends, bake, baked, mesh, random_pose};
 use bvh_query::{
-    Bvh, Contact, Distance, Groups, InstanceError, InstanceId, NumberError, OwnedShape, Pose, Querier,
-    QueryError, QueryStats, Scene, SceneError, ScenePair,
+    Bvh, Contact, Distance, Groups, InstanceId, NumberError, OwnedShape, Pose, Querier, QueryError,
+    QueryStats, Scene, SceneError, ScenePair,
 };
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::seal::section;
@@ -172,7 +172,7 @@ fn answers_are_those_of_brute_force_while_instances_come_move_and_go() {
                 placed.iter_mut().for_each(|other| other.allowed.retain(|id| *id != gone.id));
                 for scene in &mut scenes {
                     scene.remove(gone.id).unwrap();
-                    assert_eq!(scene.pose(gone.id), Err(InstanceError::NoInstance(gone.id)));
+                    assert_eq!(scene.pose(gone.id), Err(SceneError::NoInstance(gone.id)));
                 }
             }
             let mut moves = Vec::new();
@@ -411,13 +411,13 @@ fn an_empty_scene_and_one_instance_have_no_pairs() {
     assert_eq!(ask(&mut scene), Answers::default());
     // The place is taken again, under another identifier.
     let next = scene.add(shape(&sphere(1)), Pose::IDENTITY).unwrap();
-    assert!(next != id && scene.remove(id) == Err(InstanceError::NoInstance(id)));
+    assert!(next != id && scene.remove(id) == Err(SceneError::NoInstance(id)));
     assert_eq!(scene.instances().collect::<Vec<_>>(), [next]);
     // Numbers stand for identifiers, removed ones included.
     assert_eq!([id, next].map(|id| InstanceId::from_bits(id.to_bits())), [id, next]);
     assert_eq!((id.to_bits(), next.to_bits()), (0, 1 << 32));
     let never = InstanceId::from_bits(u64::MAX);
-    assert_eq!(scene.remove(never), Err(InstanceError::NoInstance(never)));
+    assert_eq!(scene.remove(never), Err(SceneError::NoInstance(never)));
 }
 
 #[test]
@@ -429,7 +429,7 @@ fn bad_instances_are_refused_and_change_nothing() {
     assert_eq!((scene.find("base"), scene.find("tip")), (Some(base), None));
     assert_eq!(scene.name(base), Ok(Some("base")));
     let again = scene.add_named("base", shape.clone(), Pose::IDENTITY);
-    assert_eq!(again, Err(InstanceError::NameTaken("base".into())));
+    assert_eq!(again, Err(SceneError::NameTaken("base".into())));
     assert_eq!(scene.len(), 1);
     let sheared = Pose::new([[1.0, 1.5e-7, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]).unwrap();
     let far = Pose::new(*Pose::IDENTITY.rotation(), [0.0, 2f64.powi(118).next_up(), 0.0]).unwrap();
@@ -451,7 +451,7 @@ fn bad_instances_are_refused_and_change_nothing() {
         scene.set_allowed(tip, base, true),
         scene.remove(tip),
     ] {
-        assert_eq!(refused, Err(InstanceError::NoInstance(tip)));
+        assert_eq!(refused, Err(SceneError::NoInstance(tip)));
     }
     assert_eq!(scene.find("tip"), None);
     // An identifier of another scene may by chance be one of this scene.

@@ -4,9 +4,8 @@ use super::{Triangle, shape};
 use crate::common::shapes::{cube, plate, sphere, torus};
 use crate::common::{Random, random_pose, translation as at};
 use bvh_query::{
-    Backend, Distance, Groups, InstanceError, InstanceId, Motion, MotionAnswer, MotionOptions, NumberError,
-    OwnedShape, Pose, Querier, QueryError, RelativePath, RigidPath, Scene, SceneError, SceneMotionAnswer,
-    WorldPoseError,
+    Backend, Distance, Groups, InstanceId, Motion, MotionAnswer, MotionOptions, NumberError, OwnedShape,
+    Pose, PoseError, Querier, QueryError, RelativePath, RigidPath, Scene, SceneError, SceneMotionAnswer,
 };
 use cbvh_testkit::depth::rounds;
 
@@ -212,8 +211,8 @@ fn what_means_nothing_is_refused() {
     }
     let error = refused(&at(f64::from(2f32.powi(119)), 0.0, 0.0), MotionOptions::new());
     assert!(error.to_string().starts_with("instance part: expected a translation"), "{error}");
-    let SceneError::Refused(InstanceError::Pose { instance, source }) = error else { panic!("{error}") };
-    assert_eq!((instance.id, source), (id, WorldPoseError::TooFar(2f64.powi(119))));
+    let SceneError::Pose { instance, source } = error else { panic!("{error}") };
+    assert_eq!((instance.id, source), (id, PoseError::TooFarInWorld(2f64.powi(119))));
     /// In the middle, less rigid than a scene's poses are.
     struct Gap;
     impl RigidPath for Gap {
@@ -241,7 +240,7 @@ fn what_means_nothing_is_refused() {
     scene.remove(still).unwrap();
     assert_eq!(scene.motion(&[(id, &through)], &MotionOptions::new()), Ok(SceneMotionAnswer::Free));
     let error = scene.motion(&[(still, &through)], &MotionOptions::new()).unwrap_err();
-    assert_eq!(error, SceneError::Refused(InstanceError::NoInstance(still)));
+    assert_eq!(error, SceneError::NoInstance(still));
 }
 
 /// A path along x whose bound is lost from some time on.
