@@ -127,10 +127,23 @@ def ratio_table(cells, question, subject):
 
 
 def wrong_table(cells):
-    rows = []
-    for key, row in cells.items():
-        rows += [[name, *key, f"{len(cell.wrong)} of {cell.poses}"] for name, cell in row.items() if cell.wrong]
-    return table(["library", "question", "pair", "gap", "wrong"], sorted(rows))
+    """Returns a row for each cell with wrong answers, and for the libraries that have the same number of them."""
+    rows = {}
+    for key in sorted(cells):
+        for name, cell in cells[key].items():
+            if cell.wrong:
+                rows.setdefault((*key, f"{len(cell.wrong)} of {cell.poses}"), []).append(name)
+    return table(["libraries", "question", "pair", "gap", "wrong"], [["; ".join(names), *row] for row, names in rows.items()])
+
+
+def batch_table(batches):
+    """Returns a row for each pair and library, with the time per query for each question and gap."""
+    asked = list(dict.fromkeys((batch["batch"], batch["preset"]) for batch in batches))
+    rows = {}
+    for batch in batches:
+        row = rows.setdefault((batch["pair"], batch["runner"], str(batch["queries"]), str(batch["threads"])), [""] * len(asked))
+        row[asked.index((batch["batch"], batch["preset"]))] = microseconds(1e9 * batch["seconds"] / batch["queries"])
+    return table(["pair", "library", "queries", "threads", *(f"{question}, {preset}" for question, preset in asked)], [[*head, *row] for head, row in rows.items()])
 
 
 def comma_separated(names, rows):
@@ -244,9 +257,9 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
     plotted = lambda wanted: [f"![{file[:-4]}]({folder}{file})" for file in drawn if wanted(file)]
     of_size = lambda file: file.endswith("-scaling.svg")
     lines = ["# Speed", "", f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}.", "",
-             "Times are medians over the poses, in microseconds. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away: there,",
-             f"`collide` shows what a call costs. Each answer is compared with what is proved; {wrong or 'no'} answers are wrong, counted once for each pose. A library",
-             f"with a wrong answer in a cell is not counted as best there. All times of all libraries are in [queries.csv]({folder}queries.csv) and", f"[builds.csv]({folder}builds.csv). [What is timed]({readme})", "",
+             "Times are medians over the poses, in microseconds. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away, where",
+             f"`collide` shows the cost of a call. By the proofs, {wrong or 'no'} answers are wrong, counted once for each pose. A library with a wrong answer in a cell",
+             f"is not counted as best there. [queries.csv]({folder}queries.csv) and [builds.csv]({folder}builds.csv) have all times.", f"[What is timed]({readme})", "",
              "## In short", "", *summary(builds, cells, subject), ""]  # fmt: skip
     if sizes := plotted(of_size):
         lines += [*sizes, ""]
@@ -257,7 +270,7 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
         lines.append(f"No other library is faster in any of {compared} comparisons of queries.")
     if later := later_pairs(builds, subject):
         lines += ["", f"The first answer from the mesh, the build included, comes later than that of another library for {', '.join(later)}."]
-    lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes whose answers are right."]
+    lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes that answers correctly."]
     for question, title in QUESTIONS.items():
         if any(key[0] == question for key in cells):
             lines += ["", f"### {title} (`{question}`)", "", *ratio_table(cells, question, subject)]
@@ -267,8 +280,7 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
         lines += ["", "## Wrong answers", "", *wrong_table(cells)]
     lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds, subject)]
     if batches:
-        rows = [[b["pair"], b["runner"], b["batch"], b["preset"], str(b["queries"]), str(b["threads"]), microseconds(1e9 * b["seconds"] / b["queries"])] for b in batches]
-        lines += ["", "## Many poses in one call, on all cores", "", *table(["pair", "library", "question", "gap", "queries", "threads", "time per query"], rows)]
+        lines += ["", "## Many poses in one call, on all cores", "", "The time per query, by question and gap.", "", *batch_table(batches)]
     if failed:
         lines += ["", "## Failures", "", *(f"- {one}" for one in failed)]
     lines += ["", "## Libraries", "", *table(["name", "version", "settings"], [[name, str(of["version"]), str(of["settings"])] for name, of in head["runners"].items()])]
