@@ -142,7 +142,8 @@ impl<'a> ProbeBatch<'a> {
                 Ok::<_, (usize, Infallible)>(of_run.collect::<Vec<_>>())
             },
             |of_run| {
-                for (&number, answer) in numbers.by_ref().zip(of_run) {
+                // The answers first, so that the end of a run takes no number of the next one.
+                for (answer, &number) in of_run.into_iter().zip(numbers.by_ref()) {
                     answers[number as usize] = Some(answer);
                 }
             },
