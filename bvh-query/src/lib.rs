@@ -13,7 +13,7 @@
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
 //! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
-//! | is a point inside, and how deep? | [`Querier::side`], [`Querier::signed_distance`] | inside, on, outside; exact |
+//! | is a point inside, and how deep? | [`Querier::side`], [`Querier::signed_point_distance`] | inside, on, outside; exact |
 //! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
 //! | is the line between two points free? | [`Querier::segment_hit`] | `bool`, exact |
 //! | how deep do they overlap? | [`Querier::penetration`], [`Querier::separation`] | certified bounds, and a translation that ends it |
@@ -115,7 +115,7 @@ pub use query::probe::placed::PlacedShape;
 pub use query::probe::probe_batch::ProbeBatch;
 pub use query::probe::ray::{Ray, RayHit};
 pub use query::probe::relation::Relation;
-pub use query::probe::side::{Side, SignedDistance};
+pub use query::probe::side::{Side, SignedPointDistance};
 pub use query::querier::Querier;
 pub use query::regions::{ContactRegion, ContactRegions, RegionKind};
 pub use query::self_contacts::SelfContact;

@@ -913,7 +913,7 @@ cbvh_status cbvh_sides(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *po
                        cbvh_side *answers);
 /* Answers both questions. The surface is all triangles of the mesh: where closed parts of it overlap, or one lies within
  * another, the closest triangle may be inside the mesh, and the distance is less than that to the outside. */
-cbvh_status cbvh_signed_distances(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points,
+cbvh_status cbvh_signed_point_distances(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points,
                                   size_t count, double within, cbvh_closest_point *answers);
 
 /* All points origin + t * direction with t from 0 to `until`, both ends included. */
@@ -1119,7 +1119,7 @@ cbvh_status cbvh_scene_is_free(cbvh_scene scene, const cbvh_instance *instances,
 cbvh_status cbvh_scene_closest_points(cbvh_scene scene, const double *points, size_t count, double within,
                                       cbvh_closest_point *answers);
 cbvh_status cbvh_scene_sides(cbvh_scene scene, const double *points, size_t count, cbvh_side *answers);
-cbvh_status cbvh_scene_signed_distances(cbvh_scene scene, const double *points, size_t count, double within,
+cbvh_status cbvh_scene_signed_point_distances(cbvh_scene scene, const double *points, size_t count, double within,
                                         cbvh_closest_point *answers);
 cbvh_status cbvh_scene_first_hits(cbvh_scene scene, const cbvh_ray *rays, size_t count, cbvh_ray_hit *answers);
 cbvh_status cbvh_scene_any_hits(cbvh_scene scene, const cbvh_ray *rays, size_t count, bool *answers);

@@ -444,8 +444,8 @@ template <class Answer, class Ask> std::vector<std::optional<Answer>> found(std:
 
 } // namespace detail
 
-/// The distance of an answer of signed_distances: negative inside, NaN where the mesh has no inside.
-inline double signed_distance(const ClosestPoint &closest) {
+/// The distance of an answer of signed_point_distances: negative inside, NaN where the mesh has no inside.
+inline double signed_point_distance(const ClosestPoint &closest) {
     return closest.side == CBVH_INSIDE           ? -closest.distance
            : closest.side == CBVH_SIDE_UNDEFINED ? std::numeric_limits<double>::quiet_NaN()
                                                  : closest.distance;
@@ -1000,19 +1000,19 @@ public:
         check(cbvh_sides(raw(), mesh.raw(), &pose, point.data(), 1, &answer));
         return answer;
     }
-    /// Both: cbvh::signed_distance turns an answer into one number.
+    /// Both: cbvh::signed_point_distance turns an answer into one number.
     std::vector<std::optional<ClosestPoint>>
-    signed_distances(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {},
+    signed_point_distances(const Mesh &mesh, const std::vector<Point> &points, const Pose &pose = {},
                      double within = std::numeric_limits<double>::infinity()) {
         return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
-            return cbvh_signed_distances(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within,
+            return cbvh_signed_point_distances(raw(), mesh.raw(), &pose, detail::numbers(points), points.size(), within,
                                          answers);
         });
     }
-    std::optional<ClosestPoint> signed_distance(const Mesh &mesh, const Point &point, const Pose &pose = {},
+    std::optional<ClosestPoint> signed_point_distance(const Mesh &mesh, const Point &point, const Pose &pose = {},
                                                 double within = std::numeric_limits<double>::infinity()) {
         ClosestPoint answer{};
-        check(cbvh_signed_distances(raw(), mesh.raw(), &pose, point.data(), 1, within, &answer));
+        check(cbvh_signed_point_distances(raw(), mesh.raw(), &pose, point.data(), 1, within, &answer));
         return detail::found(answer);
     }
     /// Where rays first hit, whether they hit, and all hits.
@@ -1332,15 +1332,15 @@ public:
         return answer;
     }
     std::vector<std::optional<ClosestPoint>>
-    signed_distances(const std::vector<Point> &points, double within = std::numeric_limits<double>::infinity()) {
+    signed_point_distances(const std::vector<Point> &points, double within = std::numeric_limits<double>::infinity()) {
         return detail::found<ClosestPoint>(points.size(), [&](ClosestPoint *answers) {
-            return cbvh_scene_signed_distances(raw(), detail::numbers(points), points.size(), within, answers);
+            return cbvh_scene_signed_point_distances(raw(), detail::numbers(points), points.size(), within, answers);
         });
     }
-    std::optional<ClosestPoint> signed_distance(const Point &point,
+    std::optional<ClosestPoint> signed_point_distance(const Point &point,
                                                 double within = std::numeric_limits<double>::infinity()) {
         ClosestPoint answer{};
-        check(cbvh_scene_signed_distances(raw(), point.data(), 1, within, &answer));
+        check(cbvh_scene_signed_point_distances(raw(), point.data(), 1, within, &answer));
         return detail::found(answer);
     }
     std::vector<std::optional<RayHit>> first_hits(const std::vector<Ray> &rays) {

@@ -159,9 +159,9 @@ probes! {
     cbvh_sides, cbvh_scene_sides(points: *const f64, count: usize,) -> i32:
         |into| read_points((points, count, f64::INFINITY), into), |of, points| of.sides(points),
         |querier, mesh, point| querier.side(mesh, point), |of| of as i32;
-    cbvh_signed_distances, cbvh_scene_signed_distances(points: *const f64, count: usize, within: f64,) -> ClosestRow:
-        |into| read_points((points, count, within), into), |of, points| of.signed_distances(points, within),
-        |querier, mesh, point| querier.signed_distance(mesh, point, within), ClosestRow::from;
+    cbvh_signed_point_distances, cbvh_scene_signed_point_distances(points: *const f64, count: usize, within: f64,) -> ClosestRow:
+        |into| read_points((points, count, within), into), |of, points| of.signed_point_distances(points, within),
+        |querier, mesh, point| querier.signed_point_distance(mesh, point, within), ClosestRow::from;
     cbvh_first_hits, cbvh_scene_first_hits(rays: *const RayRow, count: usize,) -> HitRow:
         |into| read_rays(rays, count, into), |of, rays| of.first_hits(rays),
         |querier, mesh, ray| querier.first_hit(mesh, &ray), HitRow::from;

@@ -9,7 +9,7 @@ use bvh_query::{
     DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, Penetration,
     PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash, SceneClosestPoint,
     SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SelfContact, SelfContactKind,
-    Separation, Side, SignedDistance,
+    Separation, Side, SignedPointDistance,
 };
 use std::ffi::c_char;
 
@@ -368,8 +368,8 @@ macro_rules! found {
 found!(SceneDistanceRow: Self::NONE, HitRow: Self::NONE, PenetrationRow: Self::NONE);
 found!(ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
 
-impl From<SignedDistance> for ClosestRow {
-    fn from(of: SignedDistance) -> Self {
+impl From<SignedPointDistance> for ClosestRow {
+    fn from(of: SignedPointDistance) -> Self {
         Self { side: of.side as i32, ..of.closest.into() }
     }
 }
@@ -380,8 +380,8 @@ impl From<SceneClosestPoint> for ClosestRow {
     }
 }
 
-impl From<(InstanceId, SignedDistance)> for ClosestRow {
-    fn from((instance, of): (InstanceId, SignedDistance)) -> Self {
+impl From<(InstanceId, SignedPointDistance)> for ClosestRow {
+    fn from((instance, of): (InstanceId, SignedPointDistance)) -> Self {
         Self { instance: instance.into(), ..of.into() }
     }
 }

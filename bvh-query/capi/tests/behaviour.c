@@ -44,7 +44,7 @@ static void cubes(const char *parallel) {
     CHECK(sides[0] == CBVH_INSIDE && sides[1] == CBVH_OUTSIDE && sides[2] == CBVH_ON && sides[3] == CBVH_OUTSIDE);
     /* The numbers that the command prints. */
     CHECK(sides[0] == 1 && sides[1] == -1 && sides[2] == 0);
-    OK(cbvh_signed_distances(querier, one, &world, points, 4, 2, closest));
+    OK(cbvh_signed_point_distances(querier, one, &world, points, 4, 2, closest));
     CHECK(closest[0].distance == 0.25 && closest[0].side == CBVH_INSIDE && closest[1].distance == 1.5);
     CHECK(closest[1].point[2] == 0.5 && closest[2].distance == 0 && closest[2].side == CBVH_ON);
     CHECK(!closest[3].found && isnan(closest[3].distance) && closest[3].side == CBVH_SIDE_NOT_ASKED);
@@ -742,7 +742,7 @@ static void scenes(int parallel, int tracking) {
     const double points[6] = {0, 0, 0.45, 5, 0, 0};
     cbvh_closest_point closest[2];
     cbvh_side sides[2];
-    OK(cbvh_scene_signed_distances(scene, points, 2, INFINITY, closest));
+    OK(cbvh_scene_signed_point_distances(scene, points, 2, INFINITY, closest));
     CHECK(closest[0].side == CBVH_INSIDE && fabs(closest[0].distance - 0.05) < 1e-15 && closest[0].instance.id == a.id);
     CHECK(closest[1].side == CBVH_OUTSIDE && closest[1].distance == 3.5 && closest[1].instance.id == b.id);
     OK(cbvh_scene_sides(scene, points, 2, sides));
@@ -873,7 +873,7 @@ static void rounded(void) {
     CHECK(sides[0] == CBVH_INSIDE && sides[1] == CBVH_ON && sides[2] == CBVH_OUTSIDE);
     OK(cbvh_closest_points(querier, two, NULL, points, 3, INFINITY, closest));
     CHECK(closest[0].distance == 0 && closest[1].distance == 0 && closest[2].distance == 3);
-    OK(cbvh_signed_distances(querier, two, NULL, points, 3, INFINITY, closest));
+    OK(cbvh_signed_point_distances(querier, two, NULL, points, 3, INFINITY, closest));
     CHECK(closest[0].side == CBVH_INSIDE && closest[0].distance == 1 && closest[2].distance == 3);
     const cbvh_ray rays[3] = {{{-5, 0, 0}, {1, 0, 0}, INFINITY},
                               {{-5, 2, 0}, {1, 0, 0}, INFINITY},

@@ -126,7 +126,7 @@ static void *ask(void *parallel) {
         OK(cbvh_relations(querier, mesh, other, poses, 4, relation));
         (void)cbvh_contacts(querier, mesh, other, poses, 4, NULL, NULL, 0, &count);
         OK(cbvh_motions(querier, other, mesh, &path, 1, NULL, &motion));
-        OK(cbvh_signed_distances(querier, mesh, NULL, poses[0].rows, 1, INFINITY, &closest));
+        OK(cbvh_signed_point_distances(querier, mesh, NULL, poses[0].rows, 1, INFINITY, &closest));
         const cbvh_ray ray = {{0, 0, 5}, {0.01, 0.02, -1}, INFINITY};
         OK(cbvh_first_hits(querier, other, NULL, &ray, 1, &hit));
         OK(cbvh_scene_distance(scene, &nearest));

@@ -195,7 +195,7 @@ int main(int argument_count, char **arguments) {
         case 13: status = cbvh_edges_are_free(q, a, b, in, more, n, options, out); break;
         case 14: status = cbvh_closest_points(q, a, more, in, n, x, out); break;
         case 15: status = cbvh_sides(q, a, more, in, n, out); break;
-        case 16: status = cbvh_signed_distances(q, a, more, in, n, x, out); break;
+        case 16: status = cbvh_signed_point_distances(q, a, more, in, n, x, out); break;
         case 17: status = cbvh_first_hits(q, a, more, in, n, out); break;
         case 18: status = cbvh_any_hits(q, a, more, in, n, out); break;
         case 19: status = cbvh_all_hits(q, a, more, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
@@ -235,7 +235,7 @@ int main(int argument_count, char **arguments) {
         case 52: status = cbvh_scene_distance(s, out); break;
         case 53: status = cbvh_scene_motion(s, instances, paths, below(3), options, out); break;
         case 54: status = cbvh_scene_first_hits(s, in, n, out); break;
-        case 55: status = cbvh_scene_signed_distances(s, in, n, x, out); break;
+        case 55: status = cbvh_scene_signed_point_distances(s, in, n, x, out); break;
         case 56: status = cbvh_pose_then(in, more, out); break;
         case 57: status = cbvh_mesh_rounded(a, below(2) ? fabs(x) : x, (cbvh_mesh *)&made); break;
         case 58: status = cbvh_mesh_solid(a, (cbvh_mesh *)&made); break;

@@ -52,7 +52,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![
         probes::closest_points,
         probes::sides,
-        probes::signed_distances,
+        probes::signed_point_distances,
         probes::first_hits,
         probes::any_hits,
         probes::all_hits,

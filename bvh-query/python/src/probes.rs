@@ -134,7 +134,7 @@ pub(crate) fn sides<'py>(of: Of<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bo
 
 /// NaN where there is no inside, and where no surface is within the distance.
 #[pyfunction]
-pub(crate) fn signed_distances<'py>(
+pub(crate) fn signed_point_distances<'py>(
     of: Of<'py>,
     points: &Bound<'py, PyAny>,
     within: &Bound<'py, PyAny>,
@@ -142,10 +142,10 @@ pub(crate) fn signed_distances<'py>(
     let question = Question::new(points.py(), of, read_points(points, "points")?)?;
     let within = number(within, "within")?;
     let found = question.ask(
-        |batch, points| batch.signed_distances(points, within),
-        |querier, shape, &point| querier.signed_distance(shape, point, within),
+        |batch, points| batch.signed_point_distances(points, within),
+        |querier, shape, &point| querier.signed_point_distance(shape, point, within),
         |scene, points| {
-            let found = scene.signed_distances(points, within)?.into_iter();
+            let found = scene.signed_point_distances(points, within)?.into_iter();
             Ok(found.map(|found| found.map(|(_, found)| found)).collect())
         },
     )?;

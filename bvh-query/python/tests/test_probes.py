@@ -41,7 +41,7 @@ class Geometry(unittest.TestCase):
         placed = shifts((1, 2, 3))[0]
         for parallel in (False, True):
             for pose, moved in ((None, points), (placed, points + [1, 2, 3])):
-                found = self.cube.signed_distances(moved, pose=pose, parallel=parallel)
+                found = self.cube.signed_point_distances(moved, pose=pose, parallel=parallel)
                 np.testing.assert_allclose(found, expected, atol=1e-14)
                 sides = self.cube.sides(moved, pose=pose, parallel=parallel)
                 np.testing.assert_array_equal(sides == cbvh.Side.INSIDE, inside > 0)

@@ -212,7 +212,7 @@ class Pairs(unittest.TestCase):
         self.assertEqual((scene.collide(), scene.distance(), len(scene), list(scene)), (False, None, 0, []))
         self.assertEqual((scene.pairs_within(3).shape, scene.contacts().triangles.shape), ((0, 2), (0, 4)))
         self.assertEqual((scene.sides([0, 0, 0]), scene.closest_points([0, 0, 0]).instance), (Side.OUTSIDE, -1))
-        self.assertTrue(np.isnan(scene.signed_distances([0, 0, 0])))
+        self.assertTrue(np.isnan(scene.signed_point_distances([0, 0, 0])))
 
     def test_probes_meet_the_nearest_instance(self):
         scene = cbvh.Scene()
@@ -234,7 +234,7 @@ class Pairs(unittest.TestCase):
             found = scene.sides(points)
             np.testing.assert_array_equal(found == Side.INSIDE, (sides == Side.INSIDE).any(axis=0))
             signs = np.where(found == Side.INSIDE, -1, 1)
-            np.testing.assert_array_equal(scene.signed_distances(points), signs * distances.min(axis=0))
+            np.testing.assert_array_equal(scene.signed_point_distances(points), signs * distances.min(axis=0))
             first = scene.first_hits(points, others - points)
             np.testing.assert_array_equal(first.hit.found, np.isfinite(ts).any(axis=0))
             np.testing.assert_array_equal(first.instance, np.where(first.hit.found, np.argmin(ts, axis=0), -1))

@@ -124,7 +124,7 @@ class Shapes(unittest.TestCase):
         rng, probe = np.random.default_rng(8), cbvh.sphere(0.0)
         points = rng.normal(size=(500, 3)).astype(np.float32).astype(float)
         hull = cbvh.convex_hull(points)
-        self.assertTrue(np.all(hull.signed_distances(points) <= 0))
+        self.assertTrue(np.all(hull.signed_point_distances(points) <= 0))
         self.assertEqual({*map(tuple, hull.vertices)} - {*map(tuple, points)}, set())
         for direction in rng.normal(size=(50, 3)):
             direction /= np.linalg.norm(direction)
@@ -146,14 +146,14 @@ class Shapes(unittest.TestCase):
             fine = cbvh.voxels(np.argwhere(full) - 32, 0.25).solid()
             self.assertLessEqual(cells.triangle_count, 2 * fine.triangle_count)
             points = rng.uniform(-4, 6, (300, 3))
-            np.testing.assert_allclose(cells.signed_distances(points), fine.signed_distances(points), atol=1e-12)
+            np.testing.assert_allclose(cells.signed_point_distances(points), fine.signed_point_distances(points), atol=1e-12)
             np.testing.assert_array_equal(cells.sides(points), fine.sides(points))
 
     def test_points_and_rays_meet_rounded_shapes(self):
         ball = cbvh.sphere(2)
         self.assertEqual(ball.sides([1, 1, 1]), cbvh.Side.INSIDE)
         self.assertEqual(ball.sides([2, 0, 0]), cbvh.Side.ON)
-        self.assertAlmostEqual(ball.signed_distances([1, 0, 0]), -1)
+        self.assertAlmostEqual(ball.signed_point_distances([1, 0, 0]), -1)
         self.assertAlmostEqual(ball.closest_points([5, 0, 0]).distance, 3)
         hit = ball.first_hits([[-5, 0, 0], [-5, 2, 0], [-5, 2.01, 0]], [1, 0, 0])
         self.assertAlmostEqual(hit.t[0], 3, delta=1e-9)

@@ -15,7 +15,7 @@ use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::probe::ray::RayHit;
 use crate::query::probe::ray::{All, Any, First, Ray};
 use crate::query::probe::segment::MeetsSegment;
-use crate::query::probe::side::{Side, SignedDistance};
+use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
 use crate::query::stats::QueryStats;
 use crate::scene::instance::InstanceId;
@@ -75,11 +75,11 @@ impl Scene {
     ///
     /// # Errors
     /// The errors of both.
-    pub fn signed_distances(
+    pub fn signed_point_distances(
         &mut self,
         points: &[[f64; 3]],
         within: f64,
-    ) -> Result<Vec<Option<(InstanceId, SignedDistance)>>, SceneError> {
+    ) -> Result<Vec<Option<(InstanceId, SignedPointDistance)>>, SceneError> {
         check_within(within)?;
         self.each_probe(points, |search, point| {
             let point = check_point(point)?;
@@ -87,7 +87,7 @@ impl Scene {
                 return Ok(None);
             };
             let side = search.side(&point)?;
-            Ok(Some((instance, SignedDistance { side, closest })))
+            Ok(Some((instance, SignedPointDistance { side, closest })))
         })
     }
 

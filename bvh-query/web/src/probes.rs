@@ -71,8 +71,8 @@ pub fn sides(mesh: &Mesh, pose: Option<Float64Array>, points: &Float64Array) -> 
 }
 
 /// NaN where there is no inside, and where no surface is within the distance.
-#[wasm_bindgen(js_name = signedDistances)]
-pub fn signed_distances(
+#[wasm_bindgen(js_name = signedPointDistances)]
+pub fn signed_point_distances(
     mesh: &Mesh,
     pose: Option<Float64Array>,
     points: &Float64Array,
@@ -80,7 +80,7 @@ pub fn signed_distances(
 ) -> Answer<JsValue> {
     let points = rows::<3>(points, "points")?;
     let found = ask(mesh, pose.as_ref(), &points, |querier, shape, &point| {
-        querier.signed_distance(shape, point, within)
+        querier.signed_point_distance(shape, point, within)
     })?;
     Ok(answers::floats(
         found.into_iter().map(|found| found.and_then(|found| found.value()).unwrap_or(f64::NAN)),

@@ -175,10 +175,10 @@ impl Scene {
         Ok(Int8Array::from(&sides.into_iter().map(|side| side as i8).collect::<Vec<i8>>()[..]))
     }
 
-    #[wasm_bindgen(js_name = signedDistances)]
-    pub fn signed_distances(&mut self, points: &Float64Array, within: f64) -> Answer<JsValue> {
+    #[wasm_bindgen(js_name = signedPointDistances)]
+    pub fn signed_point_distances(&mut self, points: &Float64Array, within: f64) -> Answer<JsValue> {
         let points = rows::<3>(points, "points")?;
-        let distances = self.ask(|scene| scene.signed_distances(&points, within))?.into_iter();
+        let distances = self.ask(|scene| scene.signed_point_distances(&points, within))?.into_iter();
         Ok(floats(distances.map(|of| of.and_then(|(_, found)| found.value()).unwrap_or(f64::NAN))))
     }
 

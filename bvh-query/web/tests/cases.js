@@ -56,7 +56,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.motion(b, Motion.through([...pose, ...at(u, v, w)])),
         () => a.closestPoints([x, y, z], { within: w, pose }),
         () => a.sides([x, y, z]),
-        () => a.signedDistances([x, y, z, u, v, w]),
+        () => a.signedPointDistances([x, y, z, u, v, w]),
         () => a.firstHits([x, y, z], [u, v, w], { until: x }),
         () => a.anyHits([x, y, z], [u, v, w]),
         () => a.allHits([x, y, z], [u, v, w], { pose }),
@@ -290,7 +290,7 @@ export const cases = {
         );
         equal(cube.sides([0, 0, 0, 1, 0, 0, 3, 0, 0]), [1, 0, -1]);
         equal(cube.sides([0, 0, 0], { pose: at(5, 0, 0) }), [-1]);
-        equal(cube.signedDistances([0, 0, 0.5, 3, 0, 0]), [-0.5, 2]);
+        equal(cube.signedPointDistances([0, 0, 0.5, 3, 0, 0]), [-0.5, 2]);
         const hits = cube.firstHits([-5, 0.1, 0.2, -5, 7, 0], [2, 0, 0, 2, 0, 0]);
         equal(
             [hits.found, hits.t],
@@ -305,7 +305,7 @@ export const cases = {
         equal([all.length, all[0].t], [1, [2, 3]]);
         equal(cube.segmentHits([-5, 0.1, 0.2, 0, 0, 0], [0, 0.1, 0.2, 0.5, 0.5, 0.5]), [1, 0]);
         const open = cbvh.Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]);
-        equal([open.sides([0, 0, 1]), open.signedDistances([0, 0, 1])], [[2], [NaN]]);
+        equal([open.sides([0, 0, 1]), open.signedPointDistances([0, 0, 1])], [[2], [NaN]]);
     },
 
     "scenes hold instances and answer every question": (cbvh) => {
@@ -364,7 +364,7 @@ export const cases = {
                 [3, NaN],
             ],
         );
-        equal([scene.sides([4, 0, 1, 2, 0, 1]), scene.signedDistances([4, 0, 1.5])], [[1, -1], [-0.5]]);
+        equal([scene.sides([4, 0, 1, 2, 0, 1]), scene.signedPointDistances([4, 0, 1.5])], [[1, -1], [-0.5]]);
         const rays = [
             [-9, 0.1, 1],
             [1, 0, 0],

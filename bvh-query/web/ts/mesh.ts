@@ -539,10 +539,10 @@ export class Mesh extends Handle<raw.Mesh> {
      * the closest one may be inside, and the distance is less than that to the outside. Options are those of
      * `closestPoints`.
      */
-    signedDistances(points: Numbers, options: { within?: number; pose?: Numbers } = {}): Float64Array {
+    signedPointDistances(points: Numbers, options: { within?: number; pose?: Numbers } = {}): Float64Array {
         const { within = Number.POSITIVE_INFINITY } = options;
         const [array, limit, pose] = [floats(points, "points"), float(within, "within"), placed(options.pose)];
-        return this.#call((mesh) => raw.signedDistances(mesh, pose, array, limit));
+        return this.#call((mesh) => raw.signedPointDistances(mesh, pose, array, limit));
     }
 
     /** Asks about N rays. */

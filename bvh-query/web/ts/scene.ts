@@ -359,10 +359,10 @@ export class Scene extends Handle<raw.Scene> {
 
     /** Distances of N points in the world from the closest surface, negative inside any instance. NaN if the side is UNDEFINED,
      * or if no instance is within `within`. */
-    signedDistances(points: Numbers, options: { within?: number } = {}): Float64Array {
+    signedPointDistances(points: Numbers, options: { within?: number } = {}): Float64Array {
         const { within = Number.POSITIVE_INFINITY } = options;
         const [array, limit] = [floats(points, "points"), float(within, "within")];
-        return this.#call((scene) => scene.signedDistances(array, limit));
+        return this.#call((scene) => scene.signedPointDistances(array, limit));
     }
 
     #rays<T>(

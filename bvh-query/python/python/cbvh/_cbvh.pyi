@@ -78,7 +78,7 @@ __all__ = [
     "self_contacts",
     "separation",
     "sides",
-    "signed_distances",
+    "signed_point_distances",
     "voxels_core",
     "within",
 ]
@@ -305,7 +305,7 @@ def closest_points(
     of: _Of, points: ArrayLike, within: float
 ) -> _OfInstances: ...
 def sides(of: _Of, points: ArrayLike) -> Any: ...
-def signed_distances(
+def signed_point_distances(
     of: _Of, points: ArrayLike, within: float
 ) -> Any: ...
 def first_hits(

@@ -468,7 +468,7 @@ class Mesh:
         """
         return named(Side, _cbvh.sides((self._mesh, pose, parallel), points))
 
-    def signed_distances(
+    def signed_point_distances(
         self,
         points: ArrayLike,
         *,
@@ -482,7 +482,7 @@ class Mesh:
         surface is all triangles of the mesh: where closed parts of it overlap, the closest one may be inside, and the
         distance is less than that to the outside. ``points`` have shape (3,) or (N, 3). ``pose``: of this mesh in the frame of the points (body to world).
         """
-        return _cbvh.signed_distances((self._mesh, pose, parallel), points, within)
+        return _cbvh.signed_point_distances((self._mesh, pose, parallel), points, within)
 
     def first_hits(
         self,

@@ -474,13 +474,13 @@ class Scene:
         """
         return named(Side, _cbvh.sides(self._scene, points))
 
-    def signed_distances(self, points: ArrayLike, *, within: float = np.inf) -> Any:
+    def signed_point_distances(self, points: ArrayLike, *, within: float = np.inf) -> Any:
         """Distances of points in the world from the closest surface, negative inside any instance: a float, or shape
         (N,).
 
         NaN if the side is UNDEFINED, or if no instance is within ``within``.
         """
-        return _cbvh.signed_distances(self._scene, points, within)
+        return _cbvh.signed_point_distances(self._scene, points, within)
 
     def first_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> SceneRayHit:
         """Where rays in the world first hit an instance. Arguments are those of `Mesh.first_hits`."""

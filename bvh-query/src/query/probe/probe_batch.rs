@@ -11,7 +11,7 @@ use crate::query::probe::closest::check_within;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::ray::Ray;
 use crate::query::probe::ray::RayHit;
-use crate::query::probe::side::{Side, SignedDistance};
+use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
 use std::convert::Infallible;
 
@@ -72,20 +72,20 @@ impl<'a> ProbeBatch<'a> {
         self.each(points, |point| *point, |querier, point| querier.side(self.shape, *point))
     }
 
-    /// Answers [`Querier::signed_distance`] for each point.
+    /// Answers [`Querier::signed_point_distance`] for each point.
     ///
     /// # Errors
     /// [`QueryError::Number`] if `within` is negative or NaN; else the error of the first point that fails.
-    pub fn signed_distances(
+    pub fn signed_point_distances(
         &self,
         points: &[[f64; 3]],
         within: f64,
-    ) -> Result<Vec<Option<SignedDistance>>, QueryError> {
+    ) -> Result<Vec<Option<SignedPointDistance>>, QueryError> {
         check_within(within)?;
         self.each(
             points,
             |point| *point,
-            |querier, point| querier.signed_distance(self.shape, *point, within),
+            |querier, point| querier.signed_point_distance(self.shape, *point, within),
         )
     }
 

@@ -37,17 +37,17 @@ pub enum Side {
 }
 
 /// The distance of a point from the surface of a mesh, and the side that it is on. Inside overlapping parts of one mesh, the
-/// closest surface may be a face between them: see [`Querier::signed_distance`](crate::Querier::signed_distance).
+/// closest surface may be a face between them: see [`Querier::signed_point_distance`](crate::Querier::signed_point_distance).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub struct SignedDistance {
+pub struct SignedPointDistance {
     /// The side of the point.
     pub side: Side,
     /// The closest point of the surface.
     pub closest: ClosestPoint,
 }
 
-impl SignedDistance {
+impl SignedPointDistance {
     /// Returns the distance in mesh units, negative inside, or `None` if the mesh has no inside.
     pub fn value(&self) -> Option<f64> {
         match self.side {
@@ -95,12 +95,12 @@ impl Querier {
     ///
     /// # Errors
     /// The errors of [`Querier::closest_point`] and [`Querier::side`].
-    pub fn signed_distance<'a>(
+    pub fn signed_point_distance<'a>(
         &mut self,
         shape: impl Into<PlacedShape<'a>>,
         point: [f64; 3],
         within: f64,
-    ) -> Result<Option<SignedDistance>, QueryError> {
+    ) -> Result<Option<SignedPointDistance>, QueryError> {
         let shape = shape.into();
         let Some(mut closest) = self.closest_point(shape, point, within)? else { return Ok(None) };
         let stats = self.stats;
@@ -110,7 +110,7 @@ impl Querier {
             closest = self.depth(&shape, &check_point(&point)?)?.unwrap_or(closest);
         }
         self.stats.add(stats.node_tests, stats);
-        Ok(Some(SignedDistance { side, closest }))
+        Ok(Some(SignedPointDistance { side, closest }))
     }
 
     /// Returns how deep a point is inside a rounded shape, which is at most the distance from where it ends: the radius less the

@@ -280,8 +280,9 @@ fn batches_of_all_probes_have_the_same_answers() {
         let q = &mut querier;
         let expected: Vec<_> = points.iter().map(|p| q.side(shape, *p).unwrap()).collect();
         assert_eq!(batch.sides(&points), Ok(expected));
-        let expected: Vec<_> = points.iter().map(|p| q.signed_distance(shape, *p, 0.5).unwrap()).collect();
-        assert_eq!(batch.signed_distances(&points, 0.5), Ok(expected));
+        let expected: Vec<_> =
+            points.iter().map(|p| q.signed_point_distance(shape, *p, 0.5).unwrap()).collect();
+        assert_eq!(batch.signed_point_distances(&points, 0.5), Ok(expected));
         let expected: Vec<_> = rays.iter().map(|ray| q.first_hit(shape, ray).unwrap()).collect();
         assert_eq!(batch.first_hits(&rays), Ok(expected));
         let expected: Vec<_> = rays.iter().map(|ray| q.any_hit(shape, ray).unwrap()).collect();

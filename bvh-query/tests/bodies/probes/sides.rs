@@ -68,7 +68,7 @@ fn inside_overlapping_parts_the_closest_face_may_be_an_inner_one() {
     let bvh = baked(&[cube(), beside].concat());
     let mut querier = bvh_query::Querier::new().unwrap();
     // The faces at 0.5 and 1 are inside the other part; the outside is at a distance of 1.
-    let signed = querier.signed_distance(&bvh, [0.625, 0.0, 0.0], f64::INFINITY).unwrap().unwrap();
+    let signed = querier.signed_point_distance(&bvh, [0.625, 0.0, 0.0], f64::INFINITY).unwrap().unwrap();
     assert_eq!((signed.side, signed.value()), (Side::Inside, Some(-0.125)));
 }
 

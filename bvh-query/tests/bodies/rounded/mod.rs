@@ -321,7 +321,7 @@ fn points_are_on_their_side_of_rounded_cores() {
                 let near = lengths.iter().any(|length| length.compare(radius + limit).is_le());
                 assert_eq!(querier.closest_point(shape, point, limit).unwrap().is_some(), near);
             }
-            let signed = querier.signed_distance(shape, point, f64::INFINITY).unwrap().unwrap();
+            let signed = querier.signed_point_distance(shape, point, f64::INFINITY).unwrap().unwrap();
             let least =
                 core.iter().map(|triangle| point_triangle(point, triangle)).fold(f64::INFINITY, f64::min);
             assert!((signed.value().unwrap() - (least - radius)).abs() < TOLERANCE, "{signed:?}");

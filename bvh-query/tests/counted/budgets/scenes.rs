@@ -34,7 +34,7 @@ fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&s
         ("is_free", &|s| text(s.is_free(&paths, options))),
         ("closest_points", &|s| text(s.closest_points(&[point], f64::INFINITY))),
         ("sides", &|s| text(s.sides(&[point]))),
-        ("signed_distances", &|s| text(s.signed_distances(&[point], 9.0))),
+        ("signed_point_distances", &|s| text(s.signed_point_distances(&[point], 9.0))),
         ("first_hits", &|s| text(s.first_hits(&[ray]))),
         ("any_hits", &|s| text(s.any_hits(&[ray]))),
         ("all_hits", &|s| text(s.all_hits(&[ray]))),

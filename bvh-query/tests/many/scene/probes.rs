@@ -54,7 +54,7 @@ fn probes_of_a_scene_are_those_of_its_instances() {
             let closest = scene.closest_points(&points, f64::INFINITY).unwrap();
             let near = scene.closest_points(&points, 0.3).unwrap();
             let sides = scene.sides(&points).unwrap();
-            let signed = scene.signed_distances(&points, f64::INFINITY).unwrap();
+            let signed = scene.signed_point_distances(&points, f64::INFINITY).unwrap();
             let first = scene.first_hits(&rays).unwrap();
             let any = scene.any_hits(&rays).unwrap();
             let all = scene.all_hits(&rays).unwrap();
