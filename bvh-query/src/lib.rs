@@ -104,6 +104,7 @@ pub use query::batch::Batch;
 pub use query::contacts::Contact;
 pub use query::depth::clash::{Clash, ClashClass, ClashOptions};
 pub use query::depth::penetration::{Penetration, PenetrationOptions, Separation};
+pub use query::depth::signed_distance::SignedDistance;
 pub use query::displacement::displacement;
 pub use query::distance::Distance;
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};

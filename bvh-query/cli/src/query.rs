@@ -9,7 +9,7 @@ use crate::options::not_negative;
 use bvh_format::checksum::Hasher;
 use bvh_query::{
     Contact, Distance, DistanceOptions, Penetration, PenetrationOptions, Pose, Querier, QueryError, Relation,
-    Shape,
+    Shape, SignedDistance,
 };
 use clap::{Args, ValueEnum};
 use std::ops::ControlFlow;
@@ -26,7 +26,7 @@ Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that plac
 numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
 
 One answer is printed per line, in the order of the poses: collide and within 0 or 1, contacts the number of pairs of \
-triangles, distance the distance in mesh units (17 digits), relation a number, penetration five numbers. The answer about a single pose is printed as \
+triangles, distance the distance in mesh units (17 digits), relation a number, penetration and signed five numbers. The answer about a single pose is printed as \
 text for a person.
 
 collide is about surfaces: a mesh that is inside another without touching it does not collide. relation is 0 touching, \
@@ -35,11 +35,13 @@ mesh are), or 5 undefined, because a mesh that might contain the other is not cl
 
 penetration is how deep closed meshes overlap: a lower and an upper bound of the length of the shortest translation of B after \
 which the insides have nothing in common, and such a translation of the upper length, in the frame of A. All are 0 for meshes \
-that are apart, and nan if a mesh is not closed.
+that are apart, and nan if a mesh is not closed. signed is the distance of meshes that are apart and minus that depth of others, \
+between two bounds, and then the translation, 0 where they are apart. Where a mesh encloses nothing, it is never below 0.
 
 --json prints one object per pose: pose, its number in the file, from 0; poses, the name of the file, if there are several; \
 and collide, within (true or false), relation, contacts and pairs (the triangles), lower, upper, translation, point and radii (what \
-proves lower: a ball about the point in each mesh), or distance, lower, upper, point_a, \
+proves lower: a ball about the point in each mesh, unless both are convex), for signed also normal (the way of B out of A) and \
+signed (false if a mesh encloses nothing), or distance, lower, upper, point_a, \
 point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies between lower and upper, and points are in the \
 frame of A. If a file has moved vertices, given_lower and given_upper are bounds for the meshes that were given.
 
@@ -95,6 +97,8 @@ enum Mode {
     Relation,
     /// How deep do they overlap, and which translation of B ends that?
     Penetration,
+    /// How far apart are they or, below zero, how deep do they overlap?
+    Signed,
 }
 
 /// Answers the question about pose files or about one pose.
@@ -147,6 +151,8 @@ enum Answer {
     Relation(Relation),
     /// How deep they overlap; none if a mesh is not closed.
     Penetration(Option<Penetration>),
+    /// How far apart they are or how deep they overlap.
+    Signed(SignedDistance),
 }
 
 impl Question {
@@ -191,6 +197,9 @@ impl Question {
             }
             Mode::Within => Answer::Within(querier.within(a, b, pose, self.within)?),
             Mode::Relation => Answer::Relation(querier.relation(a, b, pose)?),
+            Mode::Signed => {
+                Answer::Signed(querier.signed_distance(a, b, pose, &PenetrationOptions::default())?)
+            }
             Mode::Penetration => match querier.penetration(a, b, pose, &PenetrationOptions::default()) {
                 Err(QueryError::NotClosed { .. }) => Answer::Penetration(None),
                 answer => Answer::Penetration(Some(answer?)),
@@ -223,6 +232,17 @@ impl Question {
             Answer::Distance(distance, moves) => mesh::describe([mesh_a, mesh_b], distance, *moves),
             Answer::Relation(Relation::Undefined) => format!("{}{}\n", in_words(Relation::Undefined), why()),
             Answer::Relation(relation) => format!("{}\n", in_words(*relation)),
+            Answer::Signed(of) => {
+                let [x, y, z] = of.translation;
+                let way = if of.lower < 0.0 {
+                    format!("moving B by {x:?} {y:?} {z:?} makes the insides disjoint\n")
+                } else if of.is_signed {
+                    String::new()
+                } else {
+                    format!("a mesh encloses nothing, so that there is no depth{}\n", why())
+                };
+                format!("signed distance from {:?} to {:?}\n{way}", of.lower, of.upper)
+            }
             Answer::Penetration(None) => format!("undefined, because a mesh is not closed{}\n", why()),
             Answer::Penetration(Some(of)) => {
                 let [x, y, z] = of.translation;
@@ -240,6 +260,7 @@ impl asking::Answer for Answer {
     fn is_positive(&self) -> bool {
         match self {
             Self::Distance(of, _) => of.distance <= 0.0,
+            Self::Signed(of) => of.upper < 0.0,
             Self::Relation(relation) => !matches!(relation, Relation::Apart | Relation::Undefined),
             _ => self.value() > 0.0,
         }
@@ -250,6 +271,7 @@ impl asking::Answer for Answer {
             Self::Collide(flag) | Self::Within(flag) => f64::from(u8::from(*flag)),
             Self::Contacts(count, _) => *count as f64,
             Self::Distance(of, _) => of.distance,
+            Self::Signed(of) => of.lower,
             Self::Relation(relation) => f64::from(*relation as u8),
             Self::Penetration(depth) => depth.map_or(0.0, |of| of.lower),
         }
@@ -258,7 +280,8 @@ impl asking::Answer for Answer {
     fn line(&self) -> String {
         match self {
             Self::Penetration(None) => ["nan"; 5].join(" "),
-            Self::Penetration(Some(Penetration { lower, upper, translation: [x, y, z], .. })) => {
+            Self::Signed(SignedDistance { lower, upper, translation: [x, y, z], .. })
+            | Self::Penetration(Some(Penetration { lower, upper, translation: [x, y, z], .. })) => {
                 [lower, upper, x, y, z].map(|number| significant(*number)).join(" ")
             }
             _ => significant(self.value()),
@@ -284,6 +307,10 @@ impl asking::Answer for Answer {
                 asking::distance_json(distance).with(given)
             }
             Self::Relation(relation) => record! { relation: *relation as u8 },
+            Self::Signed(of) => record! {
+                lower: of.lower, upper: of.upper, translation: of.translation, normal: of.normal, point_a: of.point_a,
+                point_b: of.point_b, signed: of.is_signed,
+            },
             Self::Penetration(None) => record! { penetration: None::<f64> },
             Self::Penetration(Some(of)) => record! {
                 lower: of.lower, upper: of.upper, translation: of.translation, point: of.point, radii: of.radii,
@@ -298,15 +325,17 @@ impl asking::Answer for Answer {
             Self::Contacts(count, _) => hasher.update(&count.to_le_bytes()),
             Self::Distance(of, _) => hasher.update(&of.distance.to_bits().to_le_bytes()),
             Self::Relation(relation) => hasher.update(&[*relation as u8]),
-            Self::Penetration(depth) => {
-                let numbers = depth.map_or([f64::NAN; 5], |of| {
-                    let [x, y, z] = of.translation;
-                    [of.lower, of.upper, x, y, z]
-                });
-                numbers.iter().for_each(|number| hasher.update(&number.to_bits().to_le_bytes()));
+            Self::Signed(SignedDistance { lower, upper, translation: [x, y, z], .. })
+            | Self::Penetration(Some(Penetration { lower, upper, translation: [x, y, z], .. })) => {
+                hash_numbers(hasher, &[*lower, *upper, *x, *y, *z]);
             }
+            Self::Penetration(None) => hash_numbers(hasher, &[f64::NAN; 5]),
         }
     }
+}
+
+fn hash_numbers(hasher: &mut Hasher, numbers: &[f64]) {
+    numbers.iter().for_each(|number| hasher.update(&number.to_bits().to_le_bytes()));
 }
 
 /// Returns a relation in words.

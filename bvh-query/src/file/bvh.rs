@@ -5,6 +5,7 @@ use crate::file::memory;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::unpack::unpack;
 use crate::isa::Isa;
+use crate::narrow::Enclosed;
 use bvh_format::leaf::{
     F32_PACKET_BYTES, PackedHead, Packet, TriangleEncoding, VertexBlock, decode_packet, decode_triangle,
 };
@@ -54,6 +55,8 @@ struct OpenFile {
     topology: OnceLock<Result<Box<[ObjectTopology]>, FormatError>>,
     /// The open edges that have been counted, by the numbers of their objects.
     counted: Mutex<BTreeMap<usize, Arc<OpenEdges>>>,
+    /// What objects enclose whose depth was queried, by their numbers.
+    enclosed: Mutex<BTreeMap<usize, Enclosed>>,
     /// A number that no other open file of this process has or had.
     identity: u64,
 }
@@ -137,7 +140,7 @@ impl Bvh {
         static OPENED: AtomicU64 = AtomicU64::new(0);
         let identity = OPENED.fetch_add(1, Ordering::Relaxed);
         let duplicates_checked = AtomicBool::new(false);
-        let (topology, counted) = (OnceLock::new(), Mutex::default());
+        let (topology, counted, enclosed) = (OnceLock::new(), Mutex::default(), Mutex::default());
         Ok(Self(Arc::new(OpenFile {
             bytes,
             advised,
@@ -146,6 +149,7 @@ impl Bvh {
             duplicates_checked,
             topology,
             counted,
+            enclosed,
             identity,
         })))
     }
@@ -178,6 +182,11 @@ impl Bvh {
     /// Returns the open edges that have been counted.
     pub(super) fn counted(&self) -> &Mutex<BTreeMap<usize, Arc<OpenEdges>>> {
         &self.0.counted
+    }
+
+    /// Returns what objects are known to enclose.
+    pub(super) fn known_enclosed(&self) -> &Mutex<BTreeMap<usize, Enclosed>> {
+        &self.0.enclosed
     }
 
     /// Returns a number that no other open file of this process has or had.

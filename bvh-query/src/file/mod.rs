@@ -1,6 +1,7 @@
 //! Opened files: their bytes, which parts have been checked, and what queries read from them.
 
 pub(crate) mod bvh;
+mod convex;
 pub(crate) mod files;
 #[allow(unsafe_code, reason = "mapping a file is a promise about the file that no type can hold")]
 pub(crate) mod mapped;

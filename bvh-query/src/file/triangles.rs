@@ -16,6 +16,17 @@ impl Shape<'_> {
     /// # Errors
     /// [`QueryError::Damaged`] with the first rule that does not hold. Triangles of earlier pages have been visited.
     pub fn visit_triangles(self, mut visit: impl FnMut(u32, [[f64; 3]; 3])) -> Result<(), QueryError> {
+        self.visit_triangles_until(|id, corners| {
+            visit(id, corners);
+            false
+        })
+    }
+
+    /// Calls `visit` as [`Shape::visit_triangles`] does, until it returns true.
+    pub(crate) fn visit_triangles_until(
+        self,
+        mut visit: impl FnMut(u32, [[f64; 3]; 3]) -> bool,
+    ) -> Result<(), QueryError> {
         let bvh = self.bvh();
         let has_ids = bvh.layout().has_ids();
         for object in self.objects() {
@@ -35,8 +46,10 @@ impl Shape<'_> {
                             place.wrapping_add(lane as u32)
                         };
                         let corners = vertices.triangle(packet.into(), lane);
-                        visit(id, corners);
-                        bvh.duplicates_of(id)?.for_each(|duplicate| visit(duplicate, corners));
+                        let is_enough = visit(id, corners);
+                        if is_enough || bvh.duplicates_of(id)?.any(|duplicate| visit(duplicate, corners)) {
+                            return Ok(());
+                        }
                     }
                 }
             }

@@ -18,6 +18,7 @@
 
 mod candidates;
 mod contact_region;
+mod convex_solid;
 mod integers;
 mod intersection;
 mod point_distance;
@@ -30,6 +31,7 @@ mod winding;
 mod within;
 
 pub(crate) use contact_region::{MAX_POINTS, common_region, unit, unit_normal};
+pub(crate) use convex_solid::{ConvexSolid, Enclosed, has_area};
 pub(crate) use intersection::{segment_intersects, triangles_intersect};
 pub(crate) use point_distance::point_distance;
 pub(crate) use ray_crossing::{Crossing, Ray};

@@ -13,6 +13,7 @@ use crate::pose::Pose;
 use crate::query::contacts::Contact;
 use crate::query::depth::clash::{Clash, ClashOptions};
 use crate::query::depth::penetration::{Penetration, PenetrationOptions, Separation, unit};
+use crate::query::depth::signed_distance::SignedDistance;
 use crate::query::distance::Distance;
 use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
@@ -149,6 +150,22 @@ impl<'a> Batch<'a> {
         options.check()?;
         self.each(poses, |querier, _, pose| querier.penetration(self.a, self.b, pose, options))
             .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::signed_distance`] for each pose.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if an option is invalid; else the error of the first pose that fails.
+    pub fn signed_distances(
+        &self,
+        poses: &[Pose],
+        options: &PenetrationOptions,
+    ) -> Result<Vec<SignedDistance>, QueryError> {
+        options.check()?;
+        self.each(poses, |querier, tracker, pose| {
+            tracker.signed_distance(querier, self.a, self.b, pose, options)
+        })
+        .map_err(|(_, error)| error)
     }
 
     /// Answers [`Querier::clash`] for each pose.

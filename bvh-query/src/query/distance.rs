@@ -108,6 +108,17 @@ impl Querier {
         options.check()?;
         let (a, b) = (a.into(), b.into());
         self.start();
+        self.distance_between(a, b, pose, options)
+    }
+
+    /// Returns the distance of two shapes, as a part of a larger question.
+    pub(super) fn distance_between(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        options: &DistanceOptions,
+    ) -> Result<Distance, QueryError> {
         let mut search = PairSearch::between_shapes(*options, sum_of_radii(a, b));
         // Shapes have triangles, and nothing is pruned before a distance is known.
         let best = self.nearest(a, b, pose, &mut search)?.ok_or_else(|| no_answer(a))?;

@@ -152,8 +152,18 @@ impl Tracker {
         b: impl Into<Shape<'a>>,
         pose: &Pose,
     ) -> Result<Distance, QueryError> {
-        let (a, b) = (a.into(), b.into());
         querier.start();
+        self.distance_between(querier, a.into(), b.into(), pose)
+    }
+
+    /// Returns the distance of two shapes, as a part of a larger question.
+    pub(super) fn distance_between(
+        &mut self,
+        querier: &mut Querier,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+    ) -> Result<Distance, QueryError> {
         querier.look_at_objects(b)?;
         let moved = self.turn_to(a, b, pose);
         let search = || PairSearch::new(DistanceOptions::default(), f64::INFINITY);

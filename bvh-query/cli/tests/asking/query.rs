@@ -172,11 +172,50 @@ fn a_penetration_has_bounds_and_the_move_that_ends_it() {
     assert!(words.starts_with("depth from ") && words.contains("makes the insides disjoint"), "{words}");
 }
 
+/// The distance, or minus the depth, in one number between two bounds; never below 0 where a mesh is open.
+#[test]
+fn a_signed_distance_is_a_distance_or_minus_a_depth() {
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    directory.write("open.obj", cube_at(1, 0).trim_end().rsplit_once('\n').unwrap().0);
+    let pose = |x: f64| format!("1 0 0 {x:?} 0 1 0 0.25 0 0 1 0.125\n");
+    directory.write("poses.txt", [1.5, 2.5, -1.75, 2.0].map(pose).concat());
+    let ask =
+        |more: &str| directory.cbvh(&format!("query cube.obj cube.obj poses.txt --mode signed{more}")).done();
+    let printed = ask("").out;
+    let lines: Vec<Vec<f64>> =
+        printed.lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
+    for (line, expected) in lines.iter().zip([-0.5, 0.5, -0.25, 0.0]) {
+        let [lower, upper, x, y, z] = line[..] else { panic!("{printed}") };
+        assert!(lower <= expected && expected <= upper && upper - lower < 1e-9, "{printed}");
+        let way = if lower < 0.0 { -lower } else { 0.0 };
+        assert!((x.abs() - way).abs() < 1e-12 && y.abs() + z.abs() < 1e-12, "{printed}");
+    }
+    let bench = ask(" --bench").json();
+    assert_eq!((&bench["positives"], &bench["mode"]), (&2.into(), &"signed".into()));
+    for (record, line) in ask(" --json").json_lines().iter().zip(&lines) {
+        assert_eq!((record["lower"].as_f64(), record["upper"].as_f64()), (Some(line[0]), Some(line[1])));
+        assert_eq!((record["translation"][0].as_f64(), &record["signed"]), (Some(line[2]), &true.into()));
+    }
+    let open = directory.cbvh("query open.obj cube.obj poses.txt --mode signed --json").done().json_lines();
+    assert!(
+        open.iter().all(|record| record["signed"] == false && record["lower"].as_f64() >= Some(0.0)),
+        "{open:?}"
+    );
+    let words = directory.cbvh("query cube.obj cube.obj --mode signed").done().out;
+    assert!(
+        words.starts_with("signed distance from -2.0") && words.contains("makes the insides disjoint"),
+        "{words}"
+    );
+    let words = directory.cbvh("query open.obj cube.obj --mode signed").done().out;
+    assert!(words.contains("there is no depth") && words.contains("A"), "{words}");
+}
+
 #[test]
 fn answers_do_not_depend_on_how_they_are_found() {
     let directory = &world();
     let backends = backends(directory);
-    for mode in ["collide", "contacts", "distance", "within", "relation", "penetration"] {
+    for mode in ["collide", "contacts", "distance", "within", "relation", "penetration", "signed"] {
         let within: &[&str] = if mode == "within" { &["--within", "0.25"] } else { &[] };
         let hashes = |more: &[&str]| -> Vec<Value> {
             let lines = ask(directory, &[&["--mode", mode], within, more].concat());

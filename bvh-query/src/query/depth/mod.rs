@@ -2,8 +2,11 @@
 
 mod balls;
 pub(crate) mod clash;
+mod convex;
 mod free;
 mod leaving;
 pub(crate) mod penetration;
 mod planes;
+mod polytope;
+pub(crate) mod signed_distance;
 mod translation;

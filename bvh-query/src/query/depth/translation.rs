@@ -6,6 +6,7 @@ use crate::numerics::{PLACING_ERROR, POSE_ERROR};
 use crate::pose::Pose;
 use crate::query::motion::radius;
 use crate::query::rounded::sum_of_radii;
+use bvh_format::vec3::length;
 
 /// Two shapes, and the line that B moves on.
 #[derive(Clone, Copy)]
@@ -77,4 +78,9 @@ impl<'a> Translation<'a> {
 pub(super) fn moved(pose: &Pose, translation: Point) -> Pose {
     let from = pose.translation();
     Pose::of_valid(*pose.rotation(), [0, 1, 2].map(|k| from[k] + translation[k]))
+}
+
+/// Returns the length of a vector, rounded up.
+pub(super) fn length_above(v: Point) -> f64 {
+    length(v) * (1.0 + 4.0 * f64::EPSILON)
 }

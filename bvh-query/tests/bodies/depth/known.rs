@@ -214,11 +214,18 @@ fn invalid_questions_are_refused() {
     }
 }
 
+/// Spheres that are not known to be convex, because one has a part somewhere else.
+fn spheres() -> (Bvh, Bvh) {
+    let mut parts = outward(sphere(2));
+    parts.extend(at(&outward(cube()), 1.0, [0.0, 0.0, 9.0]));
+    (baked(&parts), baked(&outward(sphere(3))))
+}
+
 /// However small it is, the bounds that were found before it was spent hold.
 #[test]
 fn a_spent_budget_leaves_the_bounds_so_far() {
     let mut querier = Querier::new().unwrap();
-    let (a, b) = (baked(&outward(sphere(2))), baked(&outward(sphere(3))));
+    let (a, b) = spheres();
     let pose = translation(1.25, 0.25, 0.125);
     let whole = querier.penetration(&a, &b, &pose, &PenetrationOptions::new()).unwrap();
     assert!(!whole.is_spent);
@@ -246,7 +253,7 @@ fn a_spent_budget_leaves_the_bounds_so_far() {
 #[test]
 fn a_tolerance_ends_the_search() {
     let mut querier = Querier::new().unwrap();
-    let (a, b) = (baked(&outward(sphere(2))), baked(&outward(sphere(3))));
+    let (a, b) = spheres();
     let pose = translation(1.25, 0.25, 0.125);
     let mut ask = |options: &PenetrationOptions| {
         let found = querier.penetration(&a, &b, &pose, options).unwrap();

@@ -1,8 +1,10 @@
 //! How deep shapes overlap, against depths that are known.
 
 mod clashes;
+mod convex;
 mod known;
 mod labelled;
+mod signed;
 
 use bvh_query::{Bvh, Penetration, PenetrationOptions, Pose, Querier, Relation};
 

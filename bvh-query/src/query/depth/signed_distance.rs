@@ -1,0 +1,152 @@
+//! One number for two shapes: how far apart they are or, below zero, how deep they overlap.
+
+use crate::error::QueryError;
+use crate::file::shape::Shape;
+use crate::narrow::{Point, unit};
+use crate::pose::Pose;
+use crate::query::depth::convex::has_inside;
+use crate::query::depth::penetration::{Penetration, PenetrationOptions};
+use crate::query::depth::translation::moved;
+use crate::query::distance::Distance;
+use crate::query::options::DistanceOptions;
+use crate::query::probe::relation::Relation;
+use crate::query::querier::Querier;
+use crate::query::tracker::Tracker;
+
+/// How far apart two shapes are or, below zero, how deep they overlap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct SignedDistance {
+    /// The signed distance is at least this, in mesh units.
+    pub lower: f64,
+    /// The signed distance is at most this, in mesh units.
+    pub upper: f64,
+    /// The direction in which B moves away from A at unit length, in A's frame: from the closest point on A to that on B or, where
+    /// they overlap, along `translation`. Zero where none is known, as for shapes that touch and have no depth.
+    pub normal: [f64; 3],
+    /// The closest point on A in A's frame or, where they overlap, the one that B touches after the translation.
+    pub point_a: [f64; 3],
+    /// The closest point on B in A's frame or, where they overlap, the one that touches `point_a` after the translation.
+    pub point_b: [f64; 3],
+    /// Where they overlap, a translation of B in A's frame, as long as `lower` is negative, at which interiors are disjoint; else zero.
+    pub translation: [f64; 3],
+    /// Whether both shapes have an inside: they are closed and have a radius or triangles with area. If not, they have no depth, and
+    /// the number is their distance, 0 where they touch.
+    pub is_signed: bool,
+    /// Whether the budget ended the search for a depth.
+    pub is_spent: bool,
+}
+
+impl SignedDistance {
+    fn apart(found: &Distance, is_signed: bool) -> Self {
+        let Distance { lower, upper, point_a, point_b, .. } = *found;
+        let normal = unit([0, 1, 2].map(|k| point_b[k] - point_a[k]));
+        Self { lower, upper, normal, point_a, point_b, translation: [0.0; 3], is_signed, is_spent: false }
+    }
+
+    fn deep(depth: &Penetration, [point_a, point_b]: [Point; 2]) -> Self {
+        let Penetration { lower, upper, translation, is_spent, .. } = *depth;
+        // Zero is written without a sign.
+        let [lower, upper] = [0.0 - upper, 0.0 - lower];
+        Self {
+            lower,
+            upper,
+            normal: unit(translation),
+            point_a,
+            point_b,
+            translation,
+            is_signed: true,
+            is_spent,
+        }
+    }
+}
+
+impl Querier {
+    /// Returns the signed distance of two shapes: that of [`Querier::distance`] where they are apart, and minus the depth of
+    /// [`Querier::penetration`] where they overlap or one is inside the other, between two certified bounds. Where they touch, 0 is
+    /// between the bounds, which are some roundings apart.
+    ///
+    /// Shapes of which one is not closed, or a cloud or a segment without a radius, have no depth: [`SignedDistance::is_signed`] is
+    /// false then. All
+    /// numbers have the same bits on all backends.
+    ///
+    /// As B moves, the number changes by no more than a translation does, but points and normals may jump: where several are equally
+    /// near, one of them is the answer.
+    ///
+    /// Cost: that of `distance`, and of a few sides of points; where the shapes overlap, that of `penetration`.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if an option is invalid; [`QueryError::NoTopology`] if a file was baked without topology;
+    /// [`QueryError::Damaged`] if a page that the query touches is damaged; [`QueryError::Budget`] if the budget does not suffice
+    /// to find out whether the shapes are apart.
+    pub fn signed_distance<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        options: &PenetrationOptions,
+    ) -> Result<SignedDistance, QueryError> {
+        options.check()?;
+        let (a, b) = (a.into(), b.into());
+        self.start();
+        self.signed_given(a, b, pose, options, |querier| {
+            querier.distance_between(a, b, pose, &DistanceOptions::default())
+        })
+    }
+
+    /// Returns the signed distance, given what finds the distance.
+    fn signed_given(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        options: &PenetrationOptions,
+        distance: impl FnOnce(&mut Self) -> Result<Distance, QueryError>,
+    ) -> Result<SignedDistance, QueryError> {
+        let is_signed = has_inside(a)? && has_inside(b)?;
+        if is_signed
+            && let Some(found) =
+                self.convex_depth(a, b, pose, |lower, upper| options.is_enough(lower, upper))?
+        {
+            return Ok(SignedDistance::deep(&found.into(), found.points));
+        }
+        let found = distance(self)?;
+        if !is_signed {
+            return Ok(SignedDistance::apart(&found, false));
+        }
+        if found.distance > 0.0 && self.relation_of_disjoint(a, b, pose)? == Relation::Apart {
+            return Ok(SignedDistance::apart(&found, true));
+        }
+        let depth = self.search_depth(a, b, pose, options)?;
+        let free = moved(pose, depth.translation);
+        // What the search has not spent may not suffice for this.
+        let points = match self.distance_between(a, b, &free, &DistanceOptions::default()) {
+            Ok(Distance { point_a, point_b, .. }) => {
+                [point_a, [0, 1, 2].map(|k| point_b[k] - depth.translation[k])]
+            }
+            Err(QueryError::Budget { .. }) => [found.point_a, found.point_b],
+            Err(error) => return Err(error),
+        };
+        Ok(SignedDistance::deep(&depth, points))
+    }
+}
+
+impl Tracker {
+    /// Answers [`Querier::signed_distance`], by means of `querier`.
+    ///
+    /// # Errors
+    /// The errors of [`Querier::signed_distance`].
+    pub fn signed_distance<'a>(
+        &mut self,
+        querier: &mut Querier,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        options: &PenetrationOptions,
+    ) -> Result<SignedDistance, QueryError> {
+        options.check()?;
+        let (a, b) = (a.into(), b.into());
+        querier.start();
+        querier.signed_given(a, b, pose, options, |querier| self.distance_between(querier, a, b, pose))
+    }
+}
