@@ -124,7 +124,7 @@ pub use query::stats::QueryStats;
 pub use query::tracker::Tracker;
 pub use scene::{
     Groups, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact, SceneDistance,
-    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit,
+    SceneError, SceneMotionAnswer, ScenePair, SceneRayHit, SceneSignedDistance,
 };
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.

@@ -3,7 +3,7 @@
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
 use crate::setting::{Pair, Part, Setting};
-use bvh_query::{BackendError, Distance, Querier, QueryError};
+use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
 
 /// A querier, and where everything is in the configuration in question.
 pub(crate) struct Asker {
@@ -177,11 +177,8 @@ impl Asker {
         joints: &[f64],
     ) -> Result<Option<Nearest>, RobotError> {
         self.place(setting, joints)?;
-        let mut order: Vec<(f64, usize)> =
-            setting.pairs.iter().enumerate().map(|(number, pair)| (self.gap(pair), number)).collect();
-        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut nearest: Option<Nearest> = None;
-        for (gap, number) in order {
+        for (gap, number) in self.by_gaps(setting) {
             let limit = nearest.as_ref().map_or(f64::INFINITY, |held| held.distance.upper);
             if gap > limit {
                 break;
@@ -203,6 +200,56 @@ impl Asker {
             }
         }
         Ok(nearest)
+    }
+}
+
+impl Asker {
+    /// Returns the pair with the least signed distance, and the answer in the world; none if there are no pairs.
+    pub(crate) fn nearest_signed(
+        &mut self,
+        setting: &Setting,
+        joints: &[f64],
+        options: &PenetrationOptions,
+    ) -> Result<Option<(usize, SignedDistance)>, RobotError> {
+        self.place(setting, joints)?;
+        let mut nearest: Option<(usize, SignedDistance)> = None;
+        for (gap, number) in self.by_gaps(setting) {
+            let [lower, upper] =
+                nearest.as_ref().map_or([f64::INFINITY; 2], |(_, held)| [held.lower, held.upper]);
+            // Balls that overlap come free after a move as long as the overlap, and so do the parts in them.
+            if gap > lower {
+                break;
+            }
+            let pair = &setting.pairs[number];
+            let failed = |source| failed(setting, pair, source);
+            let pose = self.relative(setting, pair).pose()?;
+            let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
+            // A part may be inside another one whose surface is far away, but not if their balls are apart.
+            if gap > 0.0 && upper.is_finite() && !self.querier.within(a, b, &pose, upper).map_err(failed)? {
+                continue;
+            }
+            let mut found = self.querier.signed_distance(a, b, &pose, options).map_err(failed)?;
+            let world = self.frame(setting, pair.a);
+            let turned = Frame { translation: [0.0; 3], ..world };
+            for point in [&mut found.point_a, &mut found.point_b] {
+                *point = world.place(*point);
+            }
+            for direction in [&mut found.normal, &mut found.translation] {
+                *direction = turned.place(*direction);
+            }
+            if nearest.as_ref().is_none_or(|held| (found.lower, number) < (held.1.lower, held.0)) {
+                nearest = Some((number, found));
+            }
+        }
+        Ok(nearest)
+    }
+
+    /// Returns the pairs by how far apart the balls around them are, the nearest first.
+    fn by_gaps(&self, setting: &Setting) -> Vec<(f64, usize)> {
+        let mut order: Vec<(f64, usize)> =
+            setting.pairs.iter().enumerate().map(|(number, pair)| (self.gap(pair), number)).collect();
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        order
     }
 }
 

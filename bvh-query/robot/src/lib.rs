@@ -41,7 +41,7 @@ pub use error::RobotError;
 pub use motions::RobotMotion;
 pub use options::{Base, Geometry, RobotOptions};
 pub use parts::{OtherBody, RobotParts};
-pub use questions::RobotDistance;
+pub use questions::{RobotDistance, RobotSignedDistance};
 pub use robot::Robot;
 pub use srdf::{Group, State};
 

@@ -4,7 +4,7 @@ use crate::asker::{Asker, Nearest};
 use crate::error::RobotError;
 use crate::robot::Robot;
 use crate::setting::Setting;
-use bvh_query::Distance;
+use bvh_query::{Distance, PenetrationOptions, SignedDistance};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -19,6 +19,16 @@ pub struct RobotDistance {
     pub nearest: Distance,
     /// The nearest points of both, in the world.
     pub points: [[f64; 3]; 2],
+}
+
+/// The two bodies with the least signed distance.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct RobotSignedDistance {
+    /// The names of both.
+    pub bodies: [String; 2],
+    /// How far they are apart or, below zero, how deep they overlap, with points, normal and translation in the world.
+    pub nearest: SignedDistance,
 }
 
 impl Robot {
@@ -71,6 +81,40 @@ impl Robot {
         self.refresh();
         let nearest = self.asker.nearest(&self.setting, joints)?;
         Ok(nearest.map(|nearest| of_bodies(&self.setting, nearest)))
+    }
+
+    /// Returns the two bodies with the least signed distance: those that overlap most or, where none do, the nearest ones. `None` if
+    /// there are no pairs. It is between the bounds of these two, whose lower one is the least. A body inside another one overlaps it,
+    /// unless one of them is not closed.
+    ///
+    /// Cost: that of [`Robot::distance`], and a depth for each pair that overlaps.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide`]; [`RobotError::Pair`] also if an option is invalid, or if a file in question was baked without
+    /// topology.
+    pub fn signed_distance(
+        &mut self,
+        joints: &[f64],
+        options: &PenetrationOptions,
+    ) -> Result<Option<RobotSignedDistance>, RobotError> {
+        self.refresh();
+        let nearest = self.asker.nearest_signed(&self.setting, joints, options)?;
+        Ok(nearest.map(|nearest| signed_of_bodies(&self.setting, nearest)))
+    }
+
+    /// Returns the two bodies with the least signed distance for each of many configurations, as [`Robot::collide_many`] does.
+    ///
+    /// # Errors
+    /// The errors of [`Robot::collide_many`] and [`Robot::signed_distance`].
+    pub fn signed_distance_many(
+        &mut self,
+        joints: &[f64],
+        options: &PenetrationOptions,
+    ) -> Result<Vec<Option<RobotSignedDistance>>, RobotError> {
+        self.many(joints, |asker, setting, joints| {
+            let nearest = asker.nearest_signed(setting, joints, options)?;
+            Ok(nearest.map(|nearest| signed_of_bodies(setting, nearest)))
+        })
     }
 
     /// Returns for each of many configurations, one after the other, whether any two bodies touch. Uses all threads of the rayon
@@ -207,6 +251,10 @@ fn names(setting: &Setting, parts: impl IntoIterator<Item = [usize; 2]>) -> Vec<
 pub(crate) fn bodies(setting: &Setting, pair: usize) -> [String; 2] {
     let pair = &setting.pairs[pair];
     setting.names([pair.a, pair.b])
+}
+
+fn signed_of_bodies(setting: &Setting, (pair, nearest): (usize, SignedDistance)) -> RobotSignedDistance {
+    RobotSignedDistance { bodies: bodies(setting, pair), nearest }
 }
 
 fn of_bodies(setting: &Setting, Nearest { pair, distance, points }: Nearest) -> RobotDistance {

@@ -15,6 +15,7 @@ mod instance;
 mod motions;
 mod pair_questions;
 mod probes;
+mod signed_distance;
 mod trackers;
 mod workers;
 mod world_box;
@@ -25,6 +26,7 @@ pub use instance::InstanceId;
 pub use motions::SceneMotionAnswer;
 pub use pair_questions::{SceneClash, SceneContact, SceneDistance, ScenePair};
 pub use probes::{SceneClosestPoint, SceneRayHit};
+pub use signed_distance::SceneSignedDistance;
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;

@@ -81,12 +81,12 @@ struct NearPair {
 }
 
 /// A pair of instances as questions about two shapes take it.
-struct InstancePair<'a> {
-    ids: ScenePair,
-    a: Shape<'a>,
-    b: Shape<'a>,
+pub(super) struct InstancePair<'a> {
+    pub(super) ids: ScenePair,
+    pub(super) a: Shape<'a>,
+    pub(super) b: Shape<'a>,
     /// B in A's frame.
-    pose: Pose,
+    pub(super) pose: Pose,
     /// What is remembered of the pair, if the scene wants that.
     tracker: Option<MutexGuard<'a, Tracker>>,
 }
@@ -376,7 +376,7 @@ impl Scene {
 
     /// Starts a question, and asks about all pairs at most `limit` apart, in ascending order. `remembers` tells that trackers
     /// help with the question.
-    fn each_near<R: Send>(
+    pub(super) fn each_near<R: Send>(
         &mut self,
         limit: f64,
         remembers: bool,
@@ -472,6 +472,16 @@ impl Scene {
     /// Makes a tracker for each candidate, if the scene wants that.
     fn remember(&mut self, near_pairs: &[NearPair]) {
         self.trackers.expect(near_pairs.iter().map(|near_pair| (near_pair.a, near_pair.b)));
+    }
+
+    /// Goes on with a question that asks about one pair.
+    pub(super) fn of_pair<R: Send>(
+        &mut self,
+        pair: ScenePair,
+        ask: impl Fn(&mut Querier, &mut InstancePair<'_>) -> Result<R, QueryError> + Sync,
+    ) -> Result<Option<R>, SceneError> {
+        let near_pair = NearPair { a: pair.a.place, b: pair.b.place, squared_gap: 0.0 };
+        Ok(self.each(&[near_pair], |querier, pair| ask(querier, pair).map(Some))?.pop())
     }
 
     /// Asks about each near pair, in the order given.

@@ -1,7 +1,7 @@
 //! Answers about robots against the same questions to a scene, pair by pair, and against many samples of motions.
 
 use bvh_bake::{Options, shapes, to_bytes};
-use bvh_query::{Bvh, MotionOptions, OwnedShape, Pose, Querier};
+use bvh_query::{Bvh, MotionOptions, OwnedShape, PenetrationOptions, Pose, Querier};
 use cbvh_robot::{Base, Edge, Robot, RobotMotion, RobotOptions};
 use cbvh_testkit::Random;
 use std::path::Path;
@@ -74,7 +74,7 @@ fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
     let pairs = robot.pairs();
     assert_eq!(pairs.len(), 6 + 10 + 3 + 2);
     let (mut rows, mut hits) = (Vec::new(), 0);
-    let mut answers = Vec::new();
+    let (mut answers, mut all_signed, options) = (Vec::new(), Vec::new(), PenetrationOptions::new());
     for _ in 0..200 {
         let q = random_values(random, &robot);
         let poses = robot.link_poses(&q).unwrap();
@@ -83,7 +83,7 @@ fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
             let world = links.iter().position(|of| of == link).map_or(Pose::IDENTITY, |place| poses[place]);
             (shape.clone(), pose.then(&world).unwrap())
         };
-        let (mut expected, mut least) = (Vec::new(), f64::INFINITY);
+        let (mut expected, mut least, mut deepest) = (Vec::new(), f64::INFINITY, f64::INFINITY);
         for pair in &pairs {
             let [(a, of_a), (b, of_b)] = [place(&pair[0]), place(&pair[1])];
             let pose = Pose::relative(&of_a, &of_b).unwrap();
@@ -91,6 +91,7 @@ fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
                 expected.push(pair.clone());
             }
             least = least.min(querier.distance(&a, &b, &pose).unwrap().distance);
+            deepest = deepest.min(querier.signed_distance(&a, &b, &pose, &options).unwrap().lower);
         }
         hits += usize::from(!expected.is_empty());
         assert_eq!(robot.pairs_in_contact(&q).unwrap(), expected);
@@ -99,6 +100,12 @@ fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
         assert!((nearest.nearest.distance - least).abs() < 1e-12);
         let way: f64 = (0..3).map(|k| (nearest.points[0][k] - nearest.points[1][k]).powi(2)).sum();
         assert!((way.sqrt() - least).abs() < 1e-9);
+        let signed = robot.signed_distance(&q, &options).unwrap().unwrap();
+        assert!((signed.nearest.lower - deepest).abs() < 1e-9, "{signed:?}, {deepest}");
+        let along =
+            |k: usize| signed.nearest.normal[k] * (signed.nearest.point_b[k] - signed.nearest.point_a[k]);
+        assert!(((0..3).map(along).sum::<f64>() - deepest).abs() < 1e-9 + 0.02 * deepest.abs(), "{signed:?}");
+        all_signed.push(Some(signed));
         answers.push((expected, nearest));
         rows.extend(q);
     }
@@ -110,6 +117,7 @@ fn the_pairs_in_contact_are_those_of_all_shapes_where_the_links_are() {
         assert!(touching.iter().eq(answers.iter().map(|(expected, _)| expected)));
         let nearest = pool.install(|| robot.distance_many(&rows)).unwrap();
         assert!(nearest.iter().flatten().eq(answers.iter().map(|(_, nearest)| nearest)));
+        assert_eq!(pool.install(|| robot.signed_distance_many(&rows, &options)).unwrap(), all_signed);
         let colliding = pool.install(|| robot.collide_many(&rows)).unwrap();
         assert!(
             colliding.iter().eq(answers

@@ -6,6 +6,7 @@ mod margins;
 mod motions;
 mod probes;
 mod shared;
+mod signed;
 mod snapshots;
 mod trackers;
 

@@ -1,0 +1,53 @@
+//! The signed distance of a scene: that of the pair which overlaps most or, where none does, which is nearest.
+
+use crate::query::depth::penetration::PenetrationOptions;
+use crate::query::depth::signed_distance::SignedDistance;
+use crate::query::probe::relation::Relation;
+use crate::scene::pair_questions::ScenePair;
+use crate::scene::{Scene, SceneError};
+
+/// The pair of instances with the least signed distance. Points and directions are in A's frame.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub struct SceneSignedDistance {
+    /// The instances: of equal pairs, the first.
+    pub pair: ScenePair,
+    /// The answer of [`Querier::signed_distance`](crate::Querier::signed_distance).
+    pub nearest: SignedDistance,
+}
+
+impl Scene {
+    /// Returns the least signed distance of all pairs, with its pair; `None` if there are no pairs. It is between the bounds of that
+    /// pair, whose lower one is the least.
+    ///
+    /// Cost: that of [`Scene::relations`], and a depth for each pair that overlaps; where none does, that of [`Scene::distance`].
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] if an option is invalid; the errors of [`Scene::relations`] and [`Scene::distance`].
+    pub fn signed_distance(
+        &mut self,
+        options: &PenetrationOptions,
+    ) -> Result<Option<SceneSignedDistance>, SceneError> {
+        options.check()?;
+        let overlaps = self.each_near(0.0, false, |querier, pair| {
+            if querier.relation(pair.a, pair.b, &pair.pose)? == Relation::Apart {
+                return Ok(None);
+            }
+            let nearest = querier.signed_distance(pair.a, pair.b, &pair.pose, options)?;
+            Ok((nearest.lower <= 0.0).then_some(SceneSignedDistance { pair: pair.ids, nearest }))
+        })?;
+        let first_of = |x: SceneSignedDistance, y| if least(&y) < least(&x) { y } else { x };
+        if let Some(deepest) = overlaps.into_iter().reduce(first_of) {
+            return Ok(Some(deepest));
+        }
+        let Some(held) = self.distance()? else { return Ok(None) };
+        let found = self.of_pair(held.pair, |querier, pair| {
+            querier.signed_distance(pair.a, pair.b, &pair.pose, options)
+        })?;
+        Ok(found.map(|nearest| SceneSignedDistance { pair: held.pair, nearest }))
+    }
+}
+
+fn least(of: &SceneSignedDistance) -> f64 {
+    of.nearest.lower
+}
