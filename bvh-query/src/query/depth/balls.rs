@@ -7,8 +7,9 @@
 
 use crate::error::QueryError;
 use crate::narrow::{Point, common_region, cross, subtract};
+use crate::query::depth::leaving::Leaving;
 use crate::query::depth::translation::Translation;
-use crate::query::probe::closest::IsWithin;
+use crate::query::probe::closest::{ClosestPoint, IsWithin};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::side::OpenObject;
 use crate::query::probe::side::Side;
@@ -136,9 +137,12 @@ impl Querier {
     }
 
     /// Returns a deep point that is found from the contact that would be the last to leave along the line.
-    pub(super) fn point_at_contact(&mut self, line: &Translation<'_>) -> Result<Balls, QueryError> {
+    pub(super) fn point_at_contact(
+        &mut self,
+        line: &Translation<'_>,
+        leaving: &Leaving,
+    ) -> Result<Balls, QueryError> {
         let (a, b) = (line.a.into(), line.b.at(line.pose));
-        let leaving = self.leaving(line, 0.0)?;
         let mut balls = line.no_balls();
         if leaving.touches_until.is_none() {
             return Ok(balls);
@@ -155,7 +159,7 @@ impl Querier {
         let mut step = line.size / 8.0;
         for _ in 0..10 {
             let centre = [0, 1, 2].map(|k| point[k] + step * (inwards[0][k] + inwards[1][k]));
-            balls.take(centre, self.depths(&a, &b, &centre)?);
+            self.offer(&a, &b, &mut balls, centre)?;
             step /= 4.0;
         }
         if balls.lower() > 0.0 {
@@ -181,7 +185,7 @@ impl Querier {
                 way.map(|x| x / length)
             });
             let centre = [0, 1, 2].map(|k| from[k] + step * (away[0][k] + away[1][k]));
-            balls.take(centre, self.depths(a, b, &centre)?);
+            self.offer(a, b, balls, centre)?;
             if balls.centre == from {
                 step /= 2.0;
             }
@@ -189,8 +193,30 @@ impl Querier {
         Ok(())
     }
 
+    /// Takes a point if its sum is larger. The sides of a point are found only where its distances leave room for that.
+    pub(super) fn offer(
+        &mut self,
+        a: &PlacedShape<'_>,
+        b: &PlacedShape<'_>,
+        balls: &mut Balls,
+        centre: Point,
+    ) -> Result<(), QueryError> {
+        let (Some(of_a), Some(of_b)) = (self.nearest_to(a, &centre)?, self.nearest_to(b, &centre)?) else {
+            return Ok(());
+        };
+        if of_a.lower + a.shape.radius() + of_b.lower + b.shape.radius() <= balls.depths.common() {
+            return Ok(());
+        }
+        let depth_a = self.depth_at(a, &centre, &of_a)?;
+        if depth_a > 0.0 {
+            let depth_b = self.depth_at(b, &centre, &of_b)?;
+            balls.take(centre, Depths { a: depth_a, b: depth_b, closest: [of_a.point, of_b.point] });
+        }
+        Ok(())
+    }
+
     /// Returns how deep a point is in both shapes.
-    pub(super) fn depths(
+    fn depths(
         &mut self,
         a: &PlacedShape<'_>,
         b: &PlacedShape<'_>,
@@ -200,18 +226,36 @@ impl Querier {
         Ok(Depths { a, b, closest: [closest_a, closest_b] })
     }
 
-    /// Returns how deep a point is in a shape at least, or minus how far away it is at most, and the closest point of the core.
+    /// Returns how deep a point is in a shape, and the closest point of the core.
     fn depth_in(&mut self, shape: &PlacedShape<'_>, point: &Point) -> Result<(f64, Point), QueryError> {
-        let radius = shape.shape.radius();
-        let Some(closest) = self.closest_of_core(shape, point, f64::INFINITY, IsWithin::Closed)? else {
-            return Ok((f64::NEG_INFINITY, *point));
-        };
+        match self.nearest_to(shape, point)? {
+            Some(closest) => Ok((self.depth_at(shape, point, &closest)?, closest.point)),
+            None => Ok((f64::NEG_INFINITY, *point)),
+        }
+    }
+
+    /// Returns the closest point of a core.
+    fn nearest_to(
+        &mut self,
+        shape: &PlacedShape<'_>,
+        point: &Point,
+    ) -> Result<Option<ClosestPoint>, QueryError> {
+        self.closest_of_core(shape, point, f64::INFINITY, IsWithin::Closed)
+    }
+
+    /// Returns how deep a point is in a shape at least, or minus how far away it is at most, given the closest point of the core.
+    fn depth_at(
+        &mut self,
+        shape: &PlacedShape<'_>,
+        point: &Point,
+        closest: &ClosestPoint,
+    ) -> Result<f64, QueryError> {
         let depth = match self.side_of(shape, point, OpenObject::Empty)? {
             Side::Inside => closest.lower,
             Side::On => 0.0,
             Side::Outside | Side::Undefined => -closest.upper,
         };
-        Ok((depth + radius, closest.point))
+        Ok(depth + shape.shape.radius())
     }
 }
 

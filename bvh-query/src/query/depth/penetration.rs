@@ -252,8 +252,15 @@ impl<'a> DepthSearch<'a> {
 
     fn run(&mut self, querier: &mut Querier) -> Result<(), QueryError> {
         let line = self.line;
-        self.improve(querier.point_at_contact(&line.along([1.0, 0.0, 0.0]))?);
-        self.improve(querier.balls(&line, FIRST_POINTS, f64::INFINITY)?);
+        // Where surfaces hardly overlap, the contact that stays the longest on this way mostly tells all that there is to know.
+        let direction = self.from_middle_to_middle();
+        self.descend(querier, direction)?;
+        if !self.is_done() {
+            let line = line.along(direction);
+            let leaving = querier.leaving(&line, 0.0)?;
+            self.improve(querier.point_at_contact(&line, &leaving)?);
+            self.improve(querier.balls(&line, FIRST_POINTS, f64::INFINITY)?);
+        }
         // Boxes are wider than vertices where offsets leave something out.
         let has_wide_box =
             |shape: Shape<'_>| shape.objects().iter().any(|of| of.vertices().left_out != [0.0; 3]);
@@ -278,6 +285,14 @@ impl<'a> DepthSearch<'a> {
             self.improve(querier.balls(&line, ALL_POINTS, enough)?);
         }
         Ok(())
+    }
+
+    /// Returns the direction from the middle of A's box to that of B's.
+    fn from_middle_to_middle(&self) -> Point {
+        let [[lo_a, hi_a], [lo_b, hi_b]] =
+            [self.line.a.into(), self.line.b.at(self.line.pose)].map(|shape| bounds(&shape));
+        let way = [0, 1, 2].map(|k| (lo_b[k] - lo_a[k]) + (hi_b[k] - hi_a[k]));
+        unit(way).unwrap_or([1.0, 0.0, 0.0])
     }
 
     /// Returns the ways on which the balls leave the other shape soonest, and the axes of both frames.
@@ -325,7 +340,9 @@ impl<'a> DepthSearch<'a> {
                 return Ok(());
             }
             let pose = moved(self.line.pose, shift);
-            balls = querier.point_at_contact(&Translation { pose: &pose, direction: normal, ..self.line })?;
+            let line = Translation { pose: &pose, direction: normal, ..self.line };
+            let leaving = querier.leaving(&line, 0.0)?;
+            balls = querier.point_at_contact(&line, &leaving)?;
         }
         unit(shift).map_or(Ok(()), |direction| self.descend(querier, direction))
     }
@@ -384,7 +401,7 @@ impl<'a> DepthSearch<'a> {
         let behind =
             SHARES.iter().flat_map(|share| ends.map(|(point, triangle)| behind(point, triangle, share * at)));
         for centre in behind.chain([back(0.5)]) {
-            best.take(centre, querier.depths(&a, &b, &centre)?);
+            querier.offer(&a, &b, &mut best, centre)?;
         }
         if best.lower() > self.balls.lower() {
             querier.ascend(&a, &b, &mut best, ASCENT_STEPS)?;
