@@ -5,6 +5,7 @@
 
 use bvh_query::{
     Clash, ClosestPoint, Contact, ContactRegion, Distance, MotionAnswer, Patches, Penetration, Pose, RayHit,
+    SignedDistance,
 };
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
@@ -154,7 +155,7 @@ pub(crate) fn triangles(contact: &Contact) -> [u32; 4] {
     [contact.object_a, contact.triangle_a, contact.object_b, contact.triangle_b]
 }
 
-/// Lower and upper bound, translation, point and radii that prove the lower one, and whether the search was ended early.
+/// Lower and upper bound, translation, common point and radii of the balls about it, and whether the search was ended early.
 pub(crate) fn penetrations<'py>(
     to: Answers<'py>,
     of: impl Iterator<Item = Option<Penetration>> + Clone,
@@ -169,6 +170,25 @@ pub(crate) fn penetrations<'py>(
         points(|of| of.point)?,
         to.rows(of.clone().map(|of| of.map_or([f64::NAN; 2], |of| of.radii)))?,
         to.values(of.clone().map(|of| of.is_some_and(|of| of.is_spent)))?,
+    )
+        .into_pyobject(to.py)
+}
+
+/// Lower and upper bound, normal, points of A and B, translation, whether there is a depth, and whether the search was ended early.
+pub(crate) fn signed_distances<'py>(
+    to: Answers<'py>,
+    of: &[SignedDistance],
+) -> PyResult<Bound<'py, PyTuple>> {
+    let of = || of.iter();
+    (
+        to.values(of().map(|of| of.lower))?,
+        to.values(of().map(|of| of.upper))?,
+        to.rows(of().map(|of| of.normal))?,
+        to.rows(of().map(|of| of.point_a))?,
+        to.rows(of().map(|of| of.point_b))?,
+        to.rows(of().map(|of| of.translation))?,
+        to.values(of().map(|of| of.is_signed))?,
+        to.values(of().map(|of| of.is_spent))?,
     )
         .into_pyobject(to.py)
 }

@@ -41,6 +41,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     functions![
         pairs::clash,
         pairs::penetration,
+        pairs::signed_distance,
         pairs::separation,
         pairs::contact_regions,
         pairs::patches,

@@ -48,6 +48,28 @@ impl<'py, 'a> Question<'py, 'a> {
         one_by_one(self.py, poses, |querier, pose| one(querier, [a, b], pose).map_err(query_error))
     }
 
+    /// Asks about all poses as `ask` does, with a budget of visits for each.
+    fn ask_within<T: Send>(
+        &self,
+        budget: u64,
+        batch: impl Fn(&Batch<'_>, &[Pose]) -> Result<Vec<T>, QueryError> + Send + Sync,
+        one: impl Fn(&mut Querier, [Shape<'_>; 2], &Pose) -> Result<T, QueryError> + Send + Sync,
+    ) -> PyResult<Vec<T>> {
+        self.ask(
+            |all, poses| {
+                let mut all = all.clone();
+                all.set_budget(budget);
+                batch(&all, poses)
+            },
+            |querier, shapes, pose| {
+                querier.set_budget(budget);
+                let found = one(querier, shapes, pose);
+                querier.set_budget(u64::MAX);
+                found
+            },
+        )
+    }
+
     fn answers(&self) -> Answers<'py> {
         Answers { py: self.py, one: self.poses.one }
     }
@@ -131,20 +153,29 @@ pub(crate) fn penetration<'py>(
 ) -> PyResult<Bound<'py, PyTuple>> {
     let question = Question::new(&asked)?;
     let (options, budget) = (depth_options(relative_gap, tolerance)?, limit(budget, "budget")? as u64);
-    let found = question.ask(
-        |batch, poses| {
-            let mut batch = batch.clone();
-            batch.set_budget(budget);
-            batch.penetrations(poses, &options)
-        },
-        |querier, [a, b], pose| {
-            querier.set_budget(budget);
-            let found = querier.penetration(a, b, pose, &options);
-            querier.set_budget(u64::MAX);
-            found
-        },
+    let found = question.ask_within(
+        budget,
+        |batch, poses| batch.penetrations(poses, &options),
+        |querier, [a, b], pose| querier.penetration(a, b, pose, &options),
     )?;
     answers::penetrations(question.answers(), found.iter().copied().map(Some))
+}
+
+#[pyfunction]
+pub(crate) fn signed_distance<'py>(
+    asked: Asked<'py>,
+    relative_gap: &Bound<'py, PyAny>,
+    tolerance: Option<&Bound<'py, PyAny>>,
+    budget: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let question = Question::new(&asked)?;
+    let (options, budget) = (depth_options(relative_gap, tolerance)?, limit(budget, "budget")? as u64);
+    let found = question.ask_within(
+        budget,
+        |batch, poses| batch.signed_distances(poses, &options),
+        |querier, [a, b], pose| querier.signed_distance(a, b, pose, &options),
+    )?;
+    answers::signed_distances(question.answers(), &found)
 }
 
 /// Clearance, tolerance, relative gap and the most visits of the search for a depth.

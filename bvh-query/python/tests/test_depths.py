@@ -27,24 +27,32 @@ def opened():
     return cbvh.bake(vertices, faces[:-1])
 
 
+def two_cubes(offset):
+    """A cube around the origin and another one, as one mesh, which is not convex."""
+    vertices, faces = cube()
+    return cbvh.bake(np.concatenate([vertices, vertices + offset]), np.concatenate([faces, np.add(faces, 8)]))
+
+
 class Depths(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.cube, cls.small = cbvh.bake(*cube()), cbvh.bake(*cube(0.25))
+        # A cube to all that is near it, whose depth is searched for as that of a mesh that is not convex.
+        cls.not_convex = two_cubes([0, 0, 9])
 
     def test_depths_of_cubes_are_known(self):
         offsets = np.random.default_rng(1).uniform(-1.2, 1.2, (100, 3))
         offsets[:3] = [[0, 0, 0], [1, 0, 0], [3, 0, 0]]
         poses, known = shifts(*offsets), np.maximum(1 - np.abs(offsets).max(axis=1), 0)
-        of_one = [self.cube.penetration(self.cube, pose) for pose in poses]
-        for parallel in (False, True):
-            found = self.cube.penetration(self.cube, poses, parallel=parallel)
+        for mesh, parallel in ((self.cube, False), (self.not_convex, False), (self.not_convex, True), (self.cube, True)):
+            found, of_one = mesh.penetration(self.cube, poses, parallel=parallel), [mesh.penetration(self.cube, pose) for pose in poses]
             self.assertTrue(np.all(found.lower <= known + 1e-12) and np.all(known <= found.upper))
             np.testing.assert_allclose(found.upper, known, rtol=0.011, atol=1e-12)
             np.testing.assert_allclose(np.linalg.norm(found.translation, axis=1), found.upper, rtol=1e-15)
-            np.testing.assert_allclose(found.radii.sum(axis=1), found.lower, atol=1e-12)
+            proved_by_balls = found.lower if mesh is self.not_convex else np.zeros(100)
+            np.testing.assert_allclose(found.radii.sum(axis=1), proved_by_balls, atol=1e-12)
             self.assertFalse(found.is_spent.any())
-            apart = self.cube.relation(self.cube, moved(poses, found.translation), parallel=parallel)
+            apart = mesh.relation(self.cube, moved(poses, found.translation), parallel=parallel)
             self.assertEqual(set(apart.tolist()), {cbvh.Relation.APART})
             for number, one in enumerate(of_one):
                 for part, parts in zip(one, found):
@@ -63,17 +71,85 @@ class Depths(unittest.TestCase):
 
     def test_a_search_ends_where_it_is_told_to(self):
         poses = random_poses(3, 50, 0.4)
-        full = self.cube.penetration(self.cube, poses)
+        full = self.not_convex.penetration(self.cube, poses)
         for parallel in (False, True):
-            spent = self.cube.penetration(self.cube, poses, budget=300, parallel=parallel)
+            spent = self.not_convex.penetration(self.cube, poses, budget=300, parallel=parallel)
             self.assertTrue(spent.is_spent.any() and np.all(spent.lower <= full.upper) and np.all(full.lower <= spent.upper))
-            apart = self.cube.relation(self.cube, moved(poses, spent.translation))
+            apart = self.not_convex.relation(self.cube, moved(poses, spent.translation))
             self.assertEqual(set(apart.tolist()), {cbvh.Relation.APART})
             # The budget is that of one call.
-            again = self.cube.penetration(self.cube, poses, parallel=parallel)
+            again = self.not_convex.penetration(self.cube, poses, parallel=parallel)
             np.testing.assert_array_equal(again.upper, full.upper)
-        deeper = self.cube.penetration(self.cube, poses, tolerance=0.2)
+        deeper = self.not_convex.penetration(self.cube, poses, tolerance=0.2)
         self.assertTrue(np.all((deeper.lower > 0.2) == (full.lower > 0.2)))
+
+    def test_signed_distances_pass_through_zero(self):
+        # A block passes through another one, from far on one side to the other.
+        (corners, faces), small = cube(), cbvh.bake(*cube())
+        large = cbvh.bake(corners * [2, 4, 4], faces)
+        x = np.arange(-24, 25) / 8
+        poses, known = shifts(*((along, 0.25, 0) for along in x)), np.abs(x) - 1.5
+        of_one = [large.signed_distance(small, pose) for pose in poses]
+        for parallel in (False, True):
+            found = large.signed_distance(small, poses, parallel=parallel)
+            self.assertTrue(np.all(found.lower <= known) and np.all(known <= found.upper))
+            np.testing.assert_allclose(found.upper, found.lower, atol=1e-9)
+            np.testing.assert_allclose(found.normal[x != 0], np.outer(np.sign(x[x != 0]), [1, 0, 0]), atol=1e-9)
+            along = np.einsum("ki,ki->k", found.normal, found.point_b - found.point_a)
+            np.testing.assert_allclose(along, known, atol=1e-9)
+            np.testing.assert_allclose(np.abs(found.point_a[:, 0]), 1, atol=1e-9)
+            np.testing.assert_allclose(np.linalg.norm(found.translation, axis=1), np.maximum(-found.lower, 0), rtol=1e-14)
+            apart = large.relation(small, moved(poses, found.translation), parallel=parallel)
+            self.assertEqual(set(apart[found.lower < 0].tolist()), {cbvh.Relation.APART})
+            self.assertTrue(found.is_signed.all() and not found.is_spent.any())
+            for number, one in enumerate(of_one):
+                for part, parts in zip(one, found):
+                    np.testing.assert_array_equal(part, parts[number])
+        one = of_one[0]
+        self.assertEqual([type(part) for part in (one.lower, one.upper, one.is_signed, one.is_spent)], [float, float, bool, bool])
+        self.assertEqual({part.shape for part in one[2:6]}, {(3,)})
+        none = large.signed_distance(small, np.zeros((0, 4, 4)))
+        self.assertEqual(([none.lower.shape, none.is_signed.dtype], {part.shape for part in none[2:6]}), ([(0,), bool], {(0, 3)}))
+
+    def test_signed_distances_are_distances_or_depths(self):
+        two = two_cubes([1.25, 0, 0])
+        hull = cbvh.convex_hull(np.random.default_rng(4).normal(size=(60, 3)))
+        poses = random_poses(11, 60, 4.0)
+        is_apart = two.relation(hull, poses) == cbvh.Relation.APART
+        self.assertTrue(5 < np.count_nonzero(is_apart) < 55)
+        distance, depth = two.distance(hull, poses), two.penetration(hull, poses)
+        for parallel in (False, True):
+            found = two.signed_distance(hull, poses, parallel=parallel)
+            np.testing.assert_array_equal(found.lower, np.where(is_apart, distance.lower, -depth.upper))
+            np.testing.assert_array_equal(found.upper, np.where(is_apart, distance.upper, -depth.lower))
+            np.testing.assert_array_equal(found.translation, np.where(is_apart[:, None], 0, depth.translation))
+            np.testing.assert_array_equal(found.point_a[is_apart], distance.point_a[is_apart])
+            np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1, rtol=1e-12)
+            self.assertTrue(found.is_signed.all() and not found.is_spent.any())
+        # The options are those of the depth.
+        near = two.signed_distance(hull, poses[~is_apart], tolerance=0.2)
+        far = two.penetration(hull, poses[~is_apart], tolerance=0.2)
+        np.testing.assert_array_equal([-near.upper, -near.lower], [far.lower, far.upper])
+        spent = two.signed_distance(hull, poses, budget=3000)
+        self.assertTrue(0 < np.count_nonzero(spent.is_spent) < 60 and np.all(spent.lower <= found.upper))
+        np.testing.assert_array_equal(two.signed_distance(hull, poses).lower, found.lower)
+        # A mesh inside another one has to go all the way out.
+        inside = self.cube.signed_distance(self.small, np.eye(4), relative_gap=1e-9)
+        self.assertTrue(inside.lower <= -0.625 <= inside.upper < -0.625 + 1e-8)
+
+    def test_what_has_no_inside_has_a_distance_only(self):
+        cloud = cbvh.cloud([[0, 0, 0], [0, 0, 3]], 0)
+        cases = [(opened(), 2, 1), (opened(), 1, 0), (cloud, 2.5, 2), (cloud, 0, 0.5), (cloud, 0.5, 0)]
+        for mesh, height, known in cases:
+            for found in (self.cube.signed_distance(mesh, shifts((0, 0, height))[0]),
+                          mesh.signed_distance(self.cube, shifts((0, 0, -height))[0])):
+                self.assertFalse(found.is_signed or found.is_spent)
+                self.assertTrue(0 <= found.lower <= known <= found.upper < known + 1e-12, (known, found))
+                self.assertEqual(found.translation.tolist(), [0, 0, 0])
+        # With a radius, points have an inside.
+        found = self.cube.signed_distance(cbvh.cloud([[0, 0, 0], [0, 0, 3]], 0.5), shifts((0, 0, 0.75), (0, 0, 1.5)))
+        self.assertTrue(found.is_signed.all())
+        self.assertTrue(np.all(found.lower <= [-0.25, 0.5]) and np.all(found.upper >= [-0.25, 0.5]))
 
     def test_separations_are_along_the_direction(self):
         offsets = np.random.default_rng(2).uniform(-0.9, 0.9, (30, 3))
@@ -200,10 +276,10 @@ class Depths(unittest.TestCase):
         for one, other in zip((*found[:-1], *found.depth), (*parallel[:-1], *parallel.depth)):
             np.testing.assert_array_equal(one, other)
         # Where the visits end the search, the bounds so far are the answer.
-        spent = self.cube.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, relative_gap=0.01, visits=200)
+        spent = self.not_convex.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, relative_gap=0.01, visits=200)
         self.assertEqual((spent.kind.tolist(), spent.depth.is_spent.tolist()), ([kind.UNDECIDED], [True]))
         self.assertTrue(spent.depth.lower[0] <= 0.03125 <= spent.depth.upper[0])
-        full = self.cube.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, visits=None)
+        full = self.not_convex.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, visits=None)
         self.assertEqual((full.kind.tolist(), full.depth.is_spent.tolist()), ([kind.OVERLAPPING], [False]))
         # By default nothing is near, and the tolerance is a millionth of the side.
         by_default = self.cube.clash(self.cube, shifts((1.0625, 0, 0), (1 - 5e-7, 0.125, 0), (1 - 4e-6, 0.125, 0)))
@@ -212,6 +288,7 @@ class Depths(unittest.TestCase):
     def test_numbers_are_checked(self):
         mesh, at, none = self.cube, np.eye(4), np.zeros((0, 4, 4))
         depth = lambda **options: lambda: mesh.penetration(mesh, none, **options)
+        signed = lambda **options: lambda: mesh.signed_distance(mesh, none, **options)
         clash = lambda **options: lambda: mesh.clash(mesh, none, **options)
         cases = [
             (ValueError, "relative_gap: expected a finite part above 0, found 0", depth(relative_gap=0)),
@@ -221,6 +298,11 @@ class Depths(unittest.TestCase):
             (TypeError, "budget: expected a whole number or None, found float", depth(budget=1.5)),
             (ValueError, "budget: expected a whole number from 0 to 2^64 - 1, found -1", depth(budget=-1)),
             (ValueError, "budget", lambda: mesh.penetration(mesh, at, budget=0)),
+            (ValueError, "relative_gap: expected a finite part above 0, found 0", signed(relative_gap=0)),
+            (ValueError, "tolerance: expected a finite depth of at least 0, found -1", signed(tolerance=-1)),
+            (TypeError, "tolerance: expected a number, found str", signed(tolerance="x")),
+            (ValueError, "budget: expected a whole number from 0 to 2^64 - 1, found -1", signed(budget=-1)),
+            (ValueError, "budget", lambda: mesh.signed_distance(mesh, shifts((3, 0, 0)), budget=0)),
             (ValueError, "clearance: expected a finite length of at least 0, found -1", clash(clearance=-1)),
             (ValueError, "clearance: expected a finite length of at least 0, found inf", clash(clearance=np.inf)),
             (ValueError, "tolerance: expected a finite depth of at least 0, found -1", clash(tolerance=-1)),
@@ -243,6 +325,8 @@ class Depths(unittest.TestCase):
             (ValueError, "expected closed objects, found object 0 open: ", opened().penetration, mesh, at),
             (ValueError, "expected closed objects, found object 0 open: ", mesh.separation, opened(), at, [1, 0, 0]),
             (ValueError, "topology", cbvh.bake(*cube(), topology=False).penetration, mesh, at),
+            (TypeError, "other: expected a cbvh.Mesh", mesh.signed_distance, "x", at),
+            (ValueError, "topology", cbvh.bake(*cube(), topology=False).signed_distance, mesh, at),
         ]
         check_errors(self, cases)
 
@@ -317,14 +401,17 @@ class SameBits(unittest.TestCase):
                 mesh.save(folder / file)
             poses = random_poses(6, 100, 2.0)
             write_rows(folder / "poses.txt", poses[:, :3].reshape(-1, 12))
-            arguments = [COMMAND, "query", "a.cbvh", "b.cbvh", "poses.txt", "--mode", "penetration", "--json"]
-            asked = subprocess.run(arguments, cwd=folder, check=True, capture_output=True, text=True)
-            rows = [json.loads(line) for line in asked.stdout.splitlines()]
-            self.assertEqual(len(rows), 100)
-            found = a.penetration(b, poses, parallel=True)
-            for name in ("lower", "upper", "translation", "point", "radii"):
-                np.testing.assert_array_equal(getattr(found, name), [row[name] for row in rows], name)
-            self.assertTrue(0 < np.count_nonzero(found.lower) < 100)
+            depths, distances = a.penetration(b, poses, parallel=True), a.signed_distance(b, poses, parallel=True)
+            of_depth = ("lower", "upper", "translation", "point", "radii")
+            of_distance = ("lower", "upper", "normal", "point_a", "point_b", "translation")
+            for mode, found, names in (("penetration", depths, of_depth), ("signed", distances, of_distance)):
+                arguments = [COMMAND, "query", "a.cbvh", "b.cbvh", "poses.txt", "--mode", mode, "--json"]
+                asked = subprocess.run(arguments, cwd=folder, check=True, capture_output=True, text=True)
+                rows = [json.loads(line) for line in asked.stdout.splitlines()]
+                self.assertEqual(len(rows), 100)
+                for name in names:
+                    np.testing.assert_array_equal(getattr(found, name), [row[name] for row in rows], f"{mode}: {name}")
+            self.assertTrue(0 < np.count_nonzero(depths.lower) < 100)
 
 
     def test_clashes_are_those_of_the_command(self):

@@ -20,6 +20,7 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 `Mesh.motion` and `Mesh.is_free` tell whether a path is free; the answer is certain at every moment.
 
 **Overlap.** `Mesh.penetration` bounds how deep closed meshes overlap, and gives a translation that separates them.
+`Mesh.signed_distance` is one number for both: the distance of meshes that are apart, and minus the depth of others.
 `Mesh.clash` and `Scene.clashes` tell parts that touch from parts that overlap, are near, contain each other or are there twice.
 `Mesh.contact_regions` and `Mesh.patches` tell where and how surfaces meet, and `Mesh.self_contacts` where a mesh meets
 itself.
@@ -77,6 +78,7 @@ from ._answers import (
     SelfContacts,
     Separation,
     Side,
+    SignedDistance,
 )
 from ._baking import BakeWarning, bake, bake_files
 from ._cbvh import BakeError, FormatError, __version__
@@ -130,6 +132,7 @@ __all__ = [
     "SelfContacts",
     "Separation",
     "Side",
+    "SignedDistance",
     "View",
     "bake",
     "bake_files",

@@ -160,9 +160,9 @@ class Penetration(NamedTuple):
     - ``upper``: the length of ``translation``.
     - ``translation``: a translation of the second mesh, in the frame of the first, at which the insides are disjoint. Shape
       (3,) or (N, 3).
-    - ``point``: what proves ``lower``: a ball about this point, in the frame of the first mesh, is inside the first mesh,
-      and another one about it is inside the second. Shape (3,) or (N, 3).
-    - ``radii``: the radii of these balls. Their sum is ``lower``, but for roundings. Shape (2,) or (N, 2).
+    - ``point``: a point in both meshes, in the frame of the first, where ``lower`` is above 0. Shape (3,) or (N, 3).
+    - ``radii``: the radii of two balls about the point, one inside each mesh, which prove ``lower``: their sum, but for
+      roundings. Both are 0 for convex meshes, of which more is known. Shape (2,) or (N, 2).
     - ``is_spent``: whether the budget or the most visits ended the search. Shape () or (N,).
     """
 
@@ -171,6 +171,36 @@ class Penetration(NamedTuple):
     translation: Floats
     point: Floats
     radii: Floats
+    is_spent: Any
+
+
+class SignedDistance(NamedTuple):
+    """How far apart two meshes are or, below zero, how deep they overlap. After N questions, each field has N elements or
+    rows.
+
+    - ``lower``: the signed distance is at least this, in mesh units. Shape () or (N,).
+    - ``upper``: it is at most this.
+    - ``normal``: the direction in which the second mesh moves away from the first at unit length, in the frame of the first:
+      from ``point_a`` to ``point_b`` or, where they overlap, along ``translation``. 0 where none is known, as for meshes that
+      touch and have no depth. Shape (3,) or (N, 3).
+    - ``point_a``: the closest point of the first mesh, in its frame or, where they overlap, the one that the second mesh
+      touches after the translation.
+    - ``point_b``: the closest point of the second mesh, in the frame of the first or, where they overlap, the one that touches
+      ``point_a`` after the translation.
+    - ``translation``: where they overlap, a translation of the second mesh, in the frame of the first, at which the insides are
+      disjoint; its length is ``-lower``. Else 0.
+    - ``is_signed``: whether both meshes have an inside: they are closed, and have a radius or triangles with area. If not, they
+      have no depth, and the number is their distance. Shape () or (N,).
+    - ``is_spent``: whether the budget ended the search for a depth. Shape () or (N,).
+    """
+
+    lower: Any
+    upper: Any
+    normal: Floats
+    point_a: Floats
+    point_b: Floats
+    translation: Floats
+    is_signed: Any
     is_spent: Any
 
 

@@ -78,6 +78,7 @@ __all__ = [
     "self_contacts",
     "separation",
     "sides",
+    "signed_distance",
     "signed_point_distances",
     "voxels_core",
     "within",
@@ -288,6 +289,9 @@ def distance(
 ) -> _Parts: ...
 def contacts(asked: _Asked) -> Any: ...
 def penetration(
+    asked: _Asked, relative_gap: float, tolerance: float | None, budget: int | None
+) -> _Parts: ...
+def signed_distance(
     asked: _Asked, relative_gap: float, tolerance: float | None, budget: int | None
 ) -> _Parts: ...
 def clash(asked: _Asked, limits: _ClashLimits) -> _Parts: ...
