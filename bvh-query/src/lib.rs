@@ -16,6 +16,7 @@
 //! | is a point inside, and how deep? | [`Querier::side`], [`Querier::signed_point_distance`] | inside, on, outside; exact |
 //! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
 //! | is the line between two points free? | [`Querier::segment_hit`] | `bool`, exact |
+//! | how far apart are they or, below zero, how deep do they overlap? | [`Querier::signed_distance`] | certified bounds, points, the way out |
 //! | how deep do they overlap? | [`Querier::penetration`], [`Querier::separation`] | certified bounds, and a translation that ends it |
 //! | are they near, touching, overlapping? | [`Querier::clash`], [`Scene::clashes`] | class, distance, depth |
 //! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
