@@ -2,7 +2,7 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::narrow::{ConvexSolid, Enclosed, Point, cross, dot, subtract, unit};
+use crate::narrow::{ConvexSolid, Enclosed, Point, dot, subtract};
 use crate::numerics::UNIT_ROUNDOFF;
 use crate::pose::Pose;
 use crate::query::depth::polytope::{Corner, Face, Polytope};
@@ -44,30 +44,6 @@ impl Solids<'_> {
         Corner { difference: subtract(of_a, of_b), of_a, of_b }
     }
 
-    /// Returns four points of the difference that are no flat tetrahedron.
-    fn first(&mut self) -> Option<Polytope> {
-        let between = subtract(self.a.centre, self.pose.place(self.b.centre));
-        let along = if unit(between) == [0.0; 3] { [1.0, 0.0, 0.0] } else { unit(between) };
-        let opposite = along.map(|x| -x);
-        let ends = [self.farthest(&opposite), self.farthest(&along)];
-        let axis = unit(subtract(ends[1].difference, ends[0].difference));
-        let least = (0..3).fold(0, |k, j| if axis[j].abs() < axis[k].abs() { j } else { k });
-        let mut across = [0.0; 3];
-        across[least] = 1.0;
-        let [side, other] = [unit(cross(axis, across)), unit(cross(axis, cross(axis, across)))];
-        for first in [side, other] {
-            let third = self.farthest(&first);
-            let normal = unit(cross(axis, subtract(third.difference, ends[0].difference)));
-            for way in [normal, normal.map(|x| -x)] {
-                let fourth = self.farthest(&way);
-                if let Some(polytope) = Polytope::tetrahedron([ends[0], ends[1], third, fourth]) {
-                    return Some(polytope);
-                }
-            }
-        }
-        None
-    }
-
     /// Returns how far B has to move along a unit direction at least until a plane across it is between the solids: the greatest
     /// difference of heights of all vertices. Heights are those over a point, so that they are as precise as the solids are small.
     fn width(&self, direction: &Point, over: &Point) -> f64 {
@@ -97,7 +73,11 @@ impl Querier {
         let placing = 2.0 * line.placing;
         let bent = placing * (1.0 + 2.0 * of_b.reach / of_b.inner);
         let mut solids = Solids { a: &of_a, b: &of_b, pose, last: [0; 2] };
-        let Some(mut polytope) = solids.first() else { return Ok(None) };
+        let between = subtract(of_a.centre, pose.place(of_b.centre));
+        let Some(mut polytope) = Polytope::spanning(between, &mut |direction| solids.farthest(direction))
+        else {
+            return Ok(None);
+        };
         let mut best: Option<(f64, Face, [Point; 2])> = None;
         let mut is_spent = false;
         loop {

@@ -6,6 +6,7 @@ mod convex;
 mod free;
 mod leaving;
 pub(crate) mod penetration;
+mod pieces;
 mod planes;
 mod polytope;
 pub(crate) mod signed_distance;

@@ -225,6 +225,8 @@ struct DepthSearch<'a> {
     translation: Point,
     best: f64,
     balls: Balls,
+    /// The depth of convex pieces.
+    pieces: f64,
 }
 
 impl<'a> DepthSearch<'a> {
@@ -238,6 +240,7 @@ impl<'a> DepthSearch<'a> {
             translation: [0.0; 3],
             best: f64::INFINITY,
             balls: line.no_balls(),
+            pieces: 0.0,
         };
         for k in 0..3 {
             for way in [hi_a[k] - lo_b[k] + spare, lo_a[k] - hi_b[k] - spare] {
@@ -260,6 +263,7 @@ impl<'a> DepthSearch<'a> {
             let leaving = querier.leaving(&line, 0.0)?;
             self.improve(querier.point_at_contact(&line, &leaving)?);
             self.improve(querier.balls(&line, FIRST_POINTS, f64::INFINITY)?);
+            self.look_at_pieces(querier)?;
         }
         // Boxes are wider than vertices where offsets leave something out.
         let has_wide_box =
@@ -283,6 +287,20 @@ impl<'a> DepthSearch<'a> {
         if !self.is_done() {
             let enough = self.best / (1.0 + self.options.relative_gap);
             self.improve(querier.balls(&line, ALL_POINTS, enough)?);
+            self.look_at_pieces(querier)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the best lower bound.
+    fn lower(&self) -> f64 {
+        self.balls.lower().max(self.pieces)
+    }
+
+    /// Looks for a better lower bound in convex pieces about the centre of the balls.
+    fn look_at_pieces(&mut self, querier: &mut Querier) -> Result<(), QueryError> {
+        if self.balls.lower() > 0.0 && !self.is_done() {
+            self.pieces = self.pieces.max(querier.depth_of_pieces(&self.line, &self.balls.centre)?);
         }
         Ok(())
     }
@@ -307,12 +325,11 @@ impl<'a> DepthSearch<'a> {
     }
 
     fn is_done(&self) -> bool {
-        let lower = self.balls.lower();
-        self.options.is_enough(lower, self.best)
+        self.options.is_enough(self.lower(), self.best)
     }
 
     fn is_good(&self) -> bool {
-        self.is_done() || self.best <= GOOD_RATIO * self.balls.lower()
+        self.is_done() || self.best <= GOOD_RATIO * self.lower()
     }
 
     fn improve(&mut self, balls: Balls) {
@@ -374,7 +391,7 @@ impl<'a> DepthSearch<'a> {
     fn attempt(&mut self, querier: &mut Querier, direction: Point) -> Result<Option<Free>, QueryError> {
         let line = self.line.along(direction);
         // All moves shorter than the lower bound are covered, in whatever direction.
-        let free = querier.free_on(&line, self.balls.lower(), WAY_FACTOR * self.best, true)?;
+        let free = querier.free_on(&line, self.lower(), WAY_FACTOR * self.best, true)?;
         if let Some(free) = &free
             && free.at < self.best
         {
@@ -411,12 +428,14 @@ impl<'a> DepthSearch<'a> {
     }
 
     fn answer(&self, is_spent: bool) -> Penetration {
+        let are_balls_best = self.balls.lower() >= self.pieces;
+        let radii = [self.balls.depths.a, self.balls.depths.b];
         Penetration {
-            lower: self.balls.lower().min(self.best),
+            lower: self.lower().min(self.best),
             upper: length_above(self.translation),
             translation: self.translation,
             point: self.balls.centre,
-            radii: [self.balls.depths.a.max(0.0), self.balls.depths.b.max(0.0)],
+            radii: if are_balls_best { radii.map(|radius| radius.max(0.0)) } else { [0.0; 2] },
             is_spent,
         }
     }

@@ -10,7 +10,7 @@
 //! turn the same way around it, so that the surface winds around 0 at least once and meets no point nearer than `r`. It winds around
 //! none outside of the difference, which is convex and contains all faces. So the ball of radius `r` about 0 is in the difference.
 
-use crate::narrow::{Point, cross, dot, subtract};
+use crate::narrow::{Point, cross, dot, subtract, unit};
 use crate::numerics::UNIT_ROUNDOFF;
 use bvh_format::vec3::length;
 
@@ -46,8 +46,30 @@ pub(super) struct Polytope {
 const MAX_CORNERS: usize = 1024;
 
 impl Polytope {
+    /// Returns a tetrahedron of four corners that are the farthest along some directions, beginning with the one given; none if the
+    /// difference has hardly any volume.
+    pub(super) fn spanning(between: Point, farthest: &mut dyn FnMut(&Point) -> Corner) -> Option<Self> {
+        let along = if unit(between) == [0.0; 3] { [1.0, 0.0, 0.0] } else { unit(between) };
+        let ends = [farthest(&along.map(|x| -x)), farthest(&along)];
+        let axis = unit(subtract(ends[1].difference, ends[0].difference));
+        let least = (0..3).fold(0, |k, j| if axis[j].abs() < axis[k].abs() { j } else { k });
+        let mut across = [0.0; 3];
+        across[least] = 1.0;
+        for side in [unit(cross(axis, across)), unit(cross(axis, cross(axis, across)))] {
+            let third = farthest(&side);
+            let normal = unit(cross(axis, subtract(third.difference, ends[0].difference)));
+            for way in [normal, normal.map(|x| -x)] {
+                let fourth = farthest(&way);
+                if let Some(polytope) = Self::tetrahedron([ends[0], ends[1], third, fourth]) {
+                    return Some(polytope);
+                }
+            }
+        }
+        None
+    }
+
     /// Returns the tetrahedron of four corners, or `None` if it certainly has hardly any volume.
-    pub(super) fn tetrahedron(corners: [Corner; 4]) -> Option<Self> {
+    fn tetrahedron(corners: [Corner; 4]) -> Option<Self> {
         let [p, q, r, s] = corners.map(|corner| corner.difference);
         let (normal, to_s) = (cross(subtract(q, p), subtract(r, p)), subtract(s, p));
         let height = dot(normal, to_s);
