@@ -626,9 +626,10 @@ typedef struct cbvh_penetration {
     double upper;
     /* A translation of B, in A's frame, after which interiors are disjoint. */
     double translation[3];
-    /* What proves `lower`: a ball about this point, in A's frame, is inside A, and another one about it inside B. */
+    /* A point in both meshes, in A's frame, where `lower` is above 0. */
     double point[3];
-    /* The radii of the balls in A and in B. Their sum is `lower`, but for roundings. */
+    /* The radii of two balls about the point, one inside A and one inside B, which prove `lower`: it is their sum, but for
+     * roundings. Both are 0 for meshes that are known to be convex, whose bounds have another proof. */
     double radii[2];
     /* 1 if the budget of the querier ended the search, else 0. */
     int32_t is_spent;
@@ -645,15 +646,51 @@ typedef struct cbvh_penetration_options {
 } cbvh_penetration_options;
 
 /* Answers how deep the meshes overlap: bounds of the length of the shortest translation of B after which interiors are
- * disjoint. All numbers are 0 where the meshes are apart. Where they only touch, `lower` is 0 and `upper` some roundings.
- * Both bounds are certain, and the search ends when it has tried all it knows: for convex meshes, `upper` is mostly
- * within a per cent of the depth, and `lower` more than half of it. `lower` is far less for meshes that are thin where
- * they cross. One core is used. It takes up to a millisecond for meshes of a hundred triangles, and some for large ones.
- * If the budget of the querier ends the search, the bounds so far are the answer; CBVH_LIMIT if it does not even suffice
- * to find out whether the meshes are apart. CBVH_INVALID_ARGUMENT for a mesh that is not closed, and for a file that was
- * baked without topology. */
+ * disjoint. All numbers are 0 where the meshes are apart. Where they only touch, `lower` is 0 and `upper` some
+ * roundings. Both bounds are certain. For convex meshes of one object and at most 4096 triangles, they are as near each
+ * other as the options ask for, down to some roundings. For others, the search ends when it has tried all it knows:
+ * `lower` is mostly more than half of the depth, and far less for meshes that are thin where they cross. One core is
+ * used. It takes some microseconds for such convex meshes, and once up to 25 ms to find out that a mesh is one. For
+ * others, it takes up to a millisecond for meshes of a hundred triangles, and some for large ones. If the budget of the
+ * querier ends the search, the bounds so far are the answer; CBVH_LIMIT if it does not even suffice to find out whether
+ * the meshes are apart. CBVH_INVALID_ARGUMENT for a mesh that is not closed, and for a file that was baked without
+ * topology. */
 cbvh_status cbvh_penetrations(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                               const cbvh_penetration_options *options, cbvh_penetration *answers);
+
+/* How far apart two meshes are or, below zero, how deep they overlap, in mesh units. */
+typedef struct cbvh_signed_distance {
+    /* The signed distance is at least this. */
+    double lower;
+    /* The signed distance is at most this. */
+    double upper;
+    /* The direction in which B moves away from A, at length 1, in A's frame: from the closest point on A to that on B or,
+     * where they overlap, along `translation`. 0 where none is known, as for meshes that touch and have no depth. */
+    double normal[3];
+    /* The closest point on A in A's frame or, where they overlap, the one that B touches after the translation. */
+    double point_a[3];
+    /* The closest point on B in A's frame or, where they overlap, the one that touches `point_a` after the translation. */
+    double point_b[3];
+    /* Where they overlap, a translation of B in A's frame, after which interiors are disjoint. Its length is -`lower`, but
+     * for roundings. Else 0. */
+    double translation[3];
+    /* 1 if both meshes have an inside: they are closed, and have a radius or triangles with area. If it is 0, they have no
+     * depth, and the number is their distance, 0 where they touch. */
+    int32_t is_signed;
+    /* 1 if the budget of the querier ended the search for a depth, else 0. */
+    int32_t is_spent;
+} cbvh_signed_distance;
+
+/* Answers the signed distance of two meshes between two certain bounds: their distance where they are apart, and minus
+ * the depth of cbvh_penetrations where they overlap or one is inside the other. Where they touch, 0 is between the
+ * bounds, which are some roundings apart. The options are those of the depth. Meshes need not be closed: see
+ * `is_signed`. When B is translated, the true number changes by no more than the length of the translation, but points
+ * and normals may jump: where several are equally near, one of them is the answer. One core is used. It takes the time
+ * of cbvh_distances and of cbvh_sides for a few points or, where the meshes overlap, that of cbvh_penetrations. If the
+ * budget of the querier ends the search for a depth, the bounds so far are the answer; CBVH_LIMIT if it does not even
+ * suffice to find out whether the meshes are apart. CBVH_INVALID_ARGUMENT for a file that was baked without topology. */
+cbvh_status cbvh_signed_distances(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
+                                  const cbvh_penetration_options *options, cbvh_signed_distance *answers);
 
 /* How two parts of an assembly lie. */
 typedef int32_t cbvh_clash_class;

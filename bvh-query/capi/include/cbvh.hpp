@@ -89,6 +89,7 @@ using OpenEdge = cbvh_open_edge;
 using DistanceAnswer = cbvh_distance_answer;
 using Separation = cbvh_separation;
 using Penetration = cbvh_penetration;
+using SignedDistance = cbvh_signed_distance;
 using Clash = cbvh_clash;
 using ClosestPoint = cbvh_closest_point;
 using RayHit = cbvh_ray_hit;
@@ -879,6 +880,21 @@ public:
         const cbvh_penetration_options raw_options = options.raw();
         return detail::answers<Penetration>(poses.size(), [&](Penetration *answers) {
             return cbvh_penetrations(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
+        });
+    }
+    /// How far apart are they or, below zero, how deep do they overlap?
+    SignedDistance signed_distance(const Mesh &a, const Mesh &b, const Pose &pose,
+                                   const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        SignedDistance answer{};
+        check(cbvh_signed_distances(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<SignedDistance> signed_distance(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
+                                                const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        return detail::answers<SignedDistance>(poses.size(), [&](SignedDistance *answers) {
+            return cbvh_signed_distances(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
         });
     }
     /// How do two parts lie: apart, near, touching, overlapping, one in the other, or twice in one place?

@@ -1,4 +1,5 @@
-//! Where and how deep two meshes overlap, and where a mesh meets itself. These questions use one core.
+//! Where and how deep two meshes overlap, how far apart they are if they do not, and where a mesh meets itself. These questions
+//! use one core.
 
 use crate::entry::entry;
 use crate::input::{self, each};
@@ -8,7 +9,7 @@ use crate::queriers;
 use crate::status::Failure;
 use crate::types::{
     ClashChoices, ClashRow, MeshHandle, PatchChoices, PatchCounts, PatchRow, PenetrationChoices,
-    PenetrationRow, PoseRows, QuerierHandle, RegionRow, SelfContactRow, SeparationRow,
+    PenetrationRow, PoseRows, QuerierHandle, RegionRow, SelfContactRow, SeparationRow, SignedDistanceRow,
 };
 use bvh_query::{Pose, Querier, QueryError, Shape};
 
@@ -73,6 +74,26 @@ pub unsafe extern "C" fn cbvh_penetrations(
         let options = input::options("options", options)?.read();
         question.each_on_one_core(answers, |querier, [a, b], (_, pose)| {
             Ok(querier.penetration(a, b, pose, &options)?)
+        })
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_signed_distances(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    poses: *const PoseRows,
+    count: usize,
+    options: *const PenetrationChoices,
+    answers: *mut SignedDistanceRow,
+) -> i32 {
+    let question = Question { querier, a, b, poses, count };
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let options = input::options("options", options)?.read();
+        question.each_on_one_core(answers, |querier, [a, b], (_, pose)| {
+            Ok(querier.signed_distance(a, b, pose, &options)?)
         })
     })
 }

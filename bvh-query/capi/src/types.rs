@@ -9,7 +9,7 @@ use bvh_query::{
     DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, Penetration,
     PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash, SceneClosestPoint,
     SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SelfContact, SelfContactKind,
-    Separation, Side, SignedPointDistance,
+    Separation, Side, SignedDistance, SignedPointDistance,
 };
 use std::ffi::c_char;
 
@@ -107,6 +107,16 @@ structures! {
         radii: [f64; 2],
         is_spent: i32,
         reserved: i32,
+    }
+    SignedDistanceRow {
+        lower: f64,
+        upper: f64,
+        normal: [f64; 3],
+        point_a: [f64; 3],
+        point_b: [f64; 3],
+        translation: [f64; 3],
+        is_signed: i32,
+        is_spent: i32,
     }
     ClashRow { kind: i32, relation: i32, distance: f64, point: [f64; 3], depth: PenetrationRow }
     RegionRow {
@@ -345,6 +355,8 @@ row!(of: Distance { distance, lower, upper, point_a, point_b, object_a, triangle
     => DistanceRow {});
 row!(of: Separation { lower, upper, translation } => SeparationRow {});
 row!(of: Penetration { lower, upper, translation, point, radii, is_spent } => PenetrationRow { reserved: 0 });
+row!(of: SignedDistance { lower, upper, normal, point_a, point_b, translation, is_signed, is_spent }
+    => SignedDistanceRow {});
 row!(of: Patch { first, count, center, normal, length, area, depth } => PatchRow {});
 row!(of: ClosestPoint { distance, lower, upper, point, object, triangle }
     => ClosestRow { instance: Instance::NONE, found: 1, side: SIDE_NOT_ASKED });

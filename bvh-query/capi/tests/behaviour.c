@@ -118,7 +118,7 @@ static void lists(void) {
 
 /* How cubes lie. */
 static void clashes(void) {
-    const cbvh_mesh one = cube(1), same = cube(1), quarter = cube(0.25);
+    const cbvh_mesh one = cube(1), same = cube(1), quarter = cube(0.25), pair = two_cubes();
     cbvh_mesh open;
     OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 11, NULL, &open));
     const cbvh_clash_options options = {.size = sizeof options, .clearance = 0.25, .tolerance = 0x1p-10};
@@ -156,21 +156,22 @@ static void clashes(void) {
     OK(cbvh_clashes(querier, one, one, poses, 3, NULL, several));
     CHECK(several[0].kind == CBVH_CLASH_APART && several[1].kind == CBVH_CLASH_TOUCHING &&
           several[2].kind == CBVH_CLASH_OVERLAPPING);
-    /* Where the visits end the search, the bounds so far are the answer. */
+    /* Where the visits end the search, the bounds so far are the answer. A search is only for what is not convex. */
     const cbvh_clash_options few = {.size = sizeof few, .tolerance = 0x1p-10, .relative_gap = 0.01, .visits = 200};
     const cbvh_pose deep = shift(0.96875, 0.125, 0);
-    OK(cbvh_clashes(querier, one, one, &deep, 1, &few, several));
+    OK(cbvh_clashes(querier, one, pair, &deep, 1, &few, several));
     CHECK(several[0].kind == CBVH_CLASH_UNDECIDED && several[0].depth.is_spent);
     CHECK(several[0].depth.lower <= 0.03125 && several[0].depth.upper >= 0.03125);
     OK(cbvh_mesh_free(one));
     OK(cbvh_mesh_free(same));
     OK(cbvh_mesh_free(quarter));
+    OK(cbvh_mesh_free(pair));
     OK(cbvh_mesh_free(open));
 }
 
 /* Where and how deep cubes overlap. */
 static void overlaps(void) {
-    const cbvh_mesh one = cube(1), quarter = cube(0.25);
+    const cbvh_mesh one = cube(1), quarter = cube(0.25), pair = two_cubes();
     /* What they have in common is a box with the sides 1/4, 7/8 and 15/16, and then nothing, and a face. */
     const cbvh_pose poses[4] = {shift(0.75, 0.125, 0.0625), shift(3, 0, 0), shift(1, 0.25, 0), shift(0, 0.125, 0)};
     const double directions[12] = {1, 0, 0, 1, 0, 0, 0, -2, 0, 0, 0, 1};
@@ -205,7 +206,7 @@ static void overlaps(void) {
     cbvh_penetration depths[3];
     OK(cbvh_penetrations(querier, one, one, poses, 3, NULL, depths));
     CHECK(depths[0].lower > 0.247 && depths[0].lower <= 0.25 && depths[0].upper >= 0.25 && depths[0].upper < 0.2525);
-    CHECK(fabs(depths[0].radii[0] + depths[0].radii[1] - depths[0].lower) < 1e-6 && !depths[0].is_spent);
+    CHECK(depths[0].radii[0] == 0 && depths[0].radii[1] == 0 && !depths[0].is_spent);
     CHECK(depths[0].point[0] > 0.25 && depths[0].point[0] < 0.5 && depths[1].upper == 0);
     CHECK(depths[2].lower == 0 && depths[2].upper < 1e-6);
     /* What is inside another one is that deep, and all translations separate. */
@@ -218,17 +219,21 @@ static void overlaps(void) {
         OK(cbvh_relations(querier, one, k ? quarter : one, &moved, 1, &relation));
         CHECK(relation == CBVH_APART && depths[k].upper >= sqrt(by[0] * by[0] + by[1] * by[1] + by[2] * by[2]));
     }
-    /* The search ends early: at a gap, at a length, and where the budget does. */
+    /* Where a mesh is not convex, balls about one point prove the lower bound. */
+    OK(cbvh_penetrations(querier, one, pair, poses, 1, NULL, depths));
+    CHECK(depths[0].lower > 0.125 && depths[0].lower <= 0.25 && depths[0].upper >= 0.25 && depths[0].upper < 0.2525);
+    CHECK(fabs(depths[0].radii[0] + depths[0].radii[1] - depths[0].lower) < 1e-6 && !depths[0].is_spent);
+    /* Its search ends early: at a gap, at a length, and where the budget does. */
     const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = 100},
         shallow = {.size = sizeof shallow, .tolerance = 0.01}, deep = {.size = sizeof deep, .tolerance = 0.6};
-    OK(cbvh_penetrations(querier, one, one, poses, 1, &gap, depths));
+    OK(cbvh_penetrations(querier, one, pair, poses, 1, &gap, depths));
     CHECK(depths[0].lower > 0 && depths[0].upper <= 101 * depths[0].lower);
-    OK(cbvh_penetrations(querier, one, one, poses, 1, &shallow, depths));
+    OK(cbvh_penetrations(querier, one, pair, poses, 1, &shallow, depths));
     CHECK(depths[0].lower > 0.01 && depths[0].upper >= 0.25);
-    OK(cbvh_penetrations(querier, one, one, poses, 1, &deep, depths));
+    OK(cbvh_penetrations(querier, one, pair, poses, 1, &deep, depths));
     CHECK(depths[0].lower <= 0.25 && depths[0].upper <= 0.6);
     OK(cbvh_querier_set_budget(querier, 100));
-    OK(cbvh_penetrations(querier, one, one, poses, 1, NULL, depths));
+    OK(cbvh_penetrations(querier, one, pair, poses, 1, NULL, depths));
     CHECK(depths[0].is_spent && depths[0].lower <= 0.25 && depths[0].upper >= 0.25);
     OK(cbvh_querier_set_budget(querier, UINT64_MAX));
 
@@ -306,6 +311,108 @@ static void overlaps(void) {
     OK(cbvh_mesh_free(balls));
     OK(cbvh_mesh_free(one));
     OK(cbvh_mesh_free(quarter));
+    OK(cbvh_mesh_free(pair));
+}
+
+/* Whether what an answer says of itself holds: its normal, its points and its translation. */
+static bool is_consistent(cbvh_mesh a, cbvh_mesh b, const cbvh_pose *pose, const cbvh_signed_distance *of) {
+    double length = 0, apart = 0, way = 0;
+    cbvh_pose moved = *pose;
+    for (int axis = 0; axis < 3; axis++) {
+        length += of->normal[axis] * of->normal[axis];
+        apart += of->normal[axis] * (of->point_b[axis] - of->point_a[axis]);
+        way += of->translation[axis] * of->translation[axis];
+        moved.rows[4 * axis + 3] += of->translation[axis];
+    }
+    cbvh_relation relation = CBVH_APART;
+    if (of->lower < 0) {
+        OK(cbvh_relations(querier, a, b, &moved, 1, &relation));
+    }
+    const double slack = 1e-9 + 0.02 * fabs(of->lower);
+    return of->lower <= of->upper && fabs(length - 1) < 1e-12 && relation == CBVH_APART &&
+           fabs(sqrt(way) - fmax(0, -of->lower)) < 1e-12 && of->lower - slack <= apart && apart <= of->upper + slack;
+}
+
+/* How far apart or how deep in each other blocks and other shapes are. */
+static void signed_distances(void) {
+    /* A block passes through another one along x, from one side to the other: the number is a known function of the way. */
+    const double sides[2][3] = {{2, 4, 4}, {1, 1, 1}};
+    cbvh_mesh blocks[2];
+    OK(cbvh_bake_box(sides[0], &blocks[0]));
+    OK(cbvh_bake_box(sides[1], &blocks[1]));
+    cbvh_pose way[49];
+    cbvh_signed_distance numbers[49], alone;
+    for (int step = 0; step < 49; step++) {
+        way[step] = shift((step - 24) / 8.0, 0.25, 0);
+    }
+    OK(cbvh_signed_distances(querier, blocks[0], blocks[1], way, 49, NULL, numbers));
+    for (int step = 0; step < 49; step++) {
+        const double x = way[step].rows[3], expected = fabs(x) - 1.5;
+        CHECK(numbers[step].lower <= expected && expected <= numbers[step].upper);
+        CHECK(numbers[step].upper - numbers[step].lower < 1e-9 && numbers[step].is_signed && !numbers[step].is_spent);
+        CHECK(is_consistent(blocks[0], blocks[1], &way[step], &numbers[step]));
+        CHECK(x == 0 || fabs(numbers[step].normal[0] - (x > 0 ? 1 : -1)) < 1e-9);
+        OK(cbvh_signed_distances(querier, blocks[0], blocks[1], &way[step], 1, NULL, &alone));
+        CHECK(memcmp(&alone, &numbers[step], sizeof alone) == 0);
+    }
+    /* It is the distance, or minus the depth with the same options, of meshes that are not convex as well. */
+    const cbvh_mesh one = cube(1), pair = two_cubes();
+    const cbvh_penetration_options options[2] = {{.size = sizeof *options}, {.size = sizeof *options, .relative_gap = 100}};
+    random_source source = {12};
+    int apart = 0, loose = 0;
+    for (int k = 0; k < 40; k++) {
+        const cbvh_pose pose = random_pose(&source, 1.5);
+        cbvh_relation relation;
+        OK(cbvh_relations(querier, one, pair, &pose, 1, &relation));
+        for (int option = 0; option < 2; option++) {
+            OK(cbvh_signed_distances(querier, one, pair, &pose, 1, &options[option], &alone));
+            CHECK(is_consistent(one, pair, &pose, &alone) && alone.is_signed && !alone.is_spent);
+            if (relation == CBVH_APART) {
+                cbvh_distance_answer distance;
+                OK(cbvh_distances(querier, one, pair, &pose, 1, NULL, &distance));
+                CHECK(alone.lower == distance.lower && alone.upper == distance.upper);
+                apart++;
+            } else {
+                cbvh_penetration depth;
+                OK(cbvh_penetrations(querier, one, pair, &pose, 1, &options[option], &depth));
+                CHECK(alone.lower == -depth.upper && alone.upper == -depth.lower);
+                loose += option == 1 && alone.upper - alone.lower > 0.01 * -alone.upper;
+            }
+        }
+    }
+    CHECK(apart > 10 && apart < 70 && loose > 0);
+    /* Where the budget ends the search, the bounds so far are the answer. */
+    const cbvh_pose deep = shift(0.375, 0.125, 0.0625);
+    OK(cbvh_querier_set_budget(querier, 200));
+    OK(cbvh_signed_distances(querier, one, pair, &deep, 1, NULL, &alone));
+    CHECK(alone.is_spent && alone.lower < 0 && alone.upper <= 0);
+    OK(cbvh_querier_set_budget(querier, UINT64_MAX));
+    /* What has no inside has a distance only, and the answer says so; a radius gives an inside to a point. */
+    const double middle[3] = {0, 0, 0};
+    cbvh_mesh open, point, ball;
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 11, NULL, &open));
+    OK(cbvh_bake_cloud(middle, 1, &point));
+    OK(cbvh_mesh_rounded(point, 0.25, &ball));
+    const struct {
+        cbvh_mesh b;
+        double x, expected;
+        bool is_signed;
+    } cases[] = {{open, 2, 1, false}, {open, 0.75, 0, false}, {point, 1, 0.5, false}, {point, 0.25, 0.25, false},
+                 {ball, 1, 0.25, true}, {ball, 0.625, -0.125, true}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const cbvh_pose pose = shift(cases[k].x, 0, 0);
+        OK(cbvh_signed_distances(querier, one, cases[k].b, &pose, 1, NULL, &alone));
+        CHECK(alone.is_signed == cases[k].is_signed && alone.lower <= cases[k].expected);
+        CHECK(cases[k].expected <= alone.upper && alone.upper - alone.lower < 1e-9);
+        CHECK(alone.is_signed || (alone.lower >= 0 && alone.translation[0] == 0));
+    }
+    OK(cbvh_mesh_free(blocks[0]));
+    OK(cbvh_mesh_free(blocks[1]));
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(pair));
+    OK(cbvh_mesh_free(open));
+    OK(cbvh_mesh_free(point));
+    OK(cbvh_mesh_free(ball));
 }
 
 /* Where a mesh meets itself: pairs of triangles of each kind, far apart from each other. */
@@ -1287,6 +1394,7 @@ int main(int count, char **arguments) {
     OK(cbvh_querier_set_parallel(querier, 0));
     lists();
     overlaps();
+    signed_distances();
     clashes();
     self_contacts();
     open_edges();

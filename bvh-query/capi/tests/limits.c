@@ -97,7 +97,7 @@ static void *ask(void *parallel) {
     cbvh_scene scene;
     cbvh_instance instance;
     cbvh_path path;
-    const cbvh_mesh mesh = cube(1), other = fan();
+    const cbvh_mesh mesh = cube(1), other = fan(), pair = two_cubes();
     OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
     OK(cbvh_querier_set_parallel(querier, cores));
     OK(cbvh_tracker_new(&tracker));
@@ -137,10 +137,15 @@ static void *ask(void *parallel) {
     const double x_axis[3] = {1, 0, 0};
     cbvh_separation way;
     cbvh_penetration depth;
+    cbvh_signed_distance number;
     cbvh_clash clash;
     size_t count;
     OK(cbvh_separations(querier, mesh, mesh, &near, x_axis, 1, &way));
     OK(cbvh_penetrations(querier, mesh, mesh, &near, 1, NULL, &depth));
+    OK(cbvh_penetrations(querier, mesh, pair, &near, 1, NULL, &depth));
+    OK(cbvh_signed_distances(querier, mesh, mesh, &near, 1, NULL, &number));
+    OK(cbvh_signed_distances(querier, mesh, pair, &near, 1, NULL, &number));
+    OK(cbvh_signed_distances(querier, mesh, other, &near, 1, NULL, &number));
     OK(cbvh_clashes(querier, mesh, mesh, &near, 1, NULL, &clash));
     (void)cbvh_patches(querier, mesh, other, &near, 1, NULL, NULL, NULL, 0, &count, NULL, 0, NULL);
     (void)cbvh_self_contacts(querier, other, NULL, 0, &count);
@@ -171,6 +176,7 @@ static void *ask(void *parallel) {
     OK(cbvh_querier_free(querier));
     OK(cbvh_mesh_free(mesh));
     OK(cbvh_mesh_free(other));
+    OK(cbvh_mesh_free(pair));
     return NULL;
 }
 

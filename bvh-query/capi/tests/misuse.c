@@ -414,6 +414,7 @@ static void overlaps(void) {
     cbvh_pose poses[2] = {CBVH_IDENTITY, CBVH_IDENTITY};
     cbvh_separation ways[2];
     cbvh_penetration depths[2];
+    cbvh_signed_distance numbers[2];
     cbvh_clash clashes[2];
     cbvh_contact_region regions[1];
     cbvh_patch patches[1];
@@ -442,6 +443,11 @@ static void overlaps(void) {
           "poses: expected a pointer, found NULL");
     FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, NULL, NULL), CBVH_INVALID_ARGUMENT,
           "answers: expected a pointer, found NULL");
+    FAILS(cbvh_signed_distances(querier, mesh, no_mesh, poses, 2, NULL, numbers), CBVH_INVALID_HANDLE, "b: ");
+    FAILS(cbvh_signed_distances(querier, mesh, mesh, NULL, 2, NULL, numbers), CBVH_INVALID_ARGUMENT,
+          "poses: expected a pointer, found NULL");
+    FAILS(cbvh_signed_distances(querier, mesh, mesh, poses, 2, NULL, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
     const double wrong[] = {NAN, -1, INFINITY, -0x1p-1074};
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
         const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = wrong[k]},
@@ -455,11 +461,17 @@ static void overlaps(void) {
         FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &gap, depths), CBVH_INVALID_ARGUMENT, "relative_gap: ");
         FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &tolerance, depths), CBVH_INVALID_ARGUMENT,
               "tolerance: ");
+        FAILS(cbvh_signed_distances(querier, mesh, mesh, poses, 2, &gap, numbers), CBVH_INVALID_ARGUMENT,
+              "relative_gap: ");
+        FAILS(cbvh_signed_distances(querier, mesh, mesh, poses, 2, &tolerance, numbers), CBVH_INVALID_ARGUMENT,
+              "tolerance: ");
         FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, &apart, NULL, patches, 1, &count, NULL, 0, NULL),
               CBVH_INVALID_ARGUMENT, "tolerance: ");
     }
     const cbvh_penetration_options other = {.size = 8}, all = {.size = sizeof all};
     FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &other, depths), CBVH_INVALID_ARGUMENT,
+          "options.size: expected 24");
+    FAILS(cbvh_signed_distances(querier, mesh, mesh, poses, 2, &other, numbers), CBVH_INVALID_ARGUMENT,
           "options.size: expected 24");
     const cbvh_clash_options smaller = {.size = 20};
     FAILS(cbvh_clashes(querier, mesh, mesh, poses, 2, &smaller, clashes), CBVH_INVALID_ARGUMENT,
@@ -477,6 +489,9 @@ static void overlaps(void) {
     OK(cbvh_penetrations(querier, mesh, mesh, poses, 1, &all, depths));
     OK(cbvh_penetrations(querier, mesh, mesh, poses, 1, NULL, &by_default));
     CHECK(memcmp(depths, &by_default, sizeof by_default) == 0);
+    OK(cbvh_signed_distances(querier, mesh, mesh, poses, 1, &all, &numbers[0]));
+    OK(cbvh_signed_distances(querier, mesh, mesh, poses, 1, NULL, &numbers[1]));
+    CHECK(memcmp(&numbers[0], &numbers[1], sizeof *numbers) == 0);
     /* One triangle has no inside, and nobody knows of a mesh that was baked without topology. */
     cbvh_mesh open, unknown;
     const cbvh_bake_options bare = {.size = sizeof bare, .no_topology = 1};
@@ -488,6 +503,8 @@ static void overlaps(void) {
     FAILS(cbvh_separations(querier, mesh, unknown, poses, directions, 2, ways), CBVH_INVALID_ARGUMENT,
           "does not say which objects are closed");
     FAILS(cbvh_penetrations(querier, unknown, mesh, poses, 2, NULL, depths), CBVH_INVALID_ARGUMENT,
+          "does not say which objects are closed");
+    FAILS(cbvh_signed_distances(querier, unknown, mesh, poses, 2, NULL, numbers), CBVH_INVALID_ARGUMENT,
           "does not say which objects are closed");
     OK(cbvh_mesh_free(open));
     OK(cbvh_mesh_free(unknown));
@@ -516,11 +533,13 @@ static void overlaps(void) {
           "count: expected a pointer, found NULL");
     OK(cbvh_separations(querier, mesh, mesh, NULL, NULL, 0, NULL));
     OK(cbvh_penetrations(querier, mesh, mesh, NULL, 0, NULL, NULL));
+    OK(cbvh_signed_distances(querier, mesh, mesh, NULL, 0, NULL, NULL));
     OK(cbvh_patches(querier, mesh, mesh, NULL, 0, NULL, NULL, NULL, 0, &count, NULL, 0, &region_count));
     CHECK(count == 0 && region_count == 0);
     /* A budget that ends all of them. */
     OK(cbvh_querier_set_budget(querier, 0));
     FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 1, NULL, depths), CBVH_LIMIT, "budget");
+    FAILS(cbvh_signed_distances(querier, mesh, mesh, poses, 1, NULL, numbers), CBVH_LIMIT, "budget");
     FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, 1, ways), CBVH_LIMIT, "budget");
     FAILS(cbvh_clashes(querier, mesh, mesh, poses, 1, NULL, clashes), CBVH_LIMIT, "budget");
     FAILS(cbvh_self_contacts(querier, mesh, contacts, 1, &count), CBVH_LIMIT, "budget");

@@ -178,7 +178,7 @@ int main(int argument_count, char **arguments) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(114)) {
+        switch (below(116)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -299,6 +299,7 @@ int main(int argument_count, char **arguments) {
         case 112: status = below(2) ? cbvh_robot_are_free(o, in, below(4), joint_count, n, options, out)
                                     : cbvh_robot_motions(o, in, below(4), joint_count, n, options, out); break;
         case 113: status = below(2) ? cbvh_mesh_open_edges(a, out, capacity, &count) : cbvh_mesh_open_edge_counts(a, out); break;
+        case 114: status = cbvh_signed_distances(q, a, b, in, n, options, out); break;
         default:
             /* Frees one, as every kind. */
             status = free_any(kept[below(KEPT)]) ? CBVH_OK : CBVH_INVALID_HANDLE;

@@ -47,6 +47,23 @@ static inline cbvh_mesh cube(double size) {
     return mesh;
 }
 
+/* Two cubes side by side along x in one object, closed and oriented, but not convex. The first one is around the origin. */
+static inline cbvh_mesh two_cubes(void) {
+    double vertices[48];
+    uint32_t faces[72];
+    for (int k = 0; k < 24; k++) {
+        vertices[k] = CUBE_VERTICES[k];
+        vertices[24 + k] = CUBE_VERTICES[k] + (k % 3 == 0 ? 1.25 : 0);
+    }
+    for (int k = 0; k < 36; k++) {
+        faces[k] = CUBE_FACES[k];
+        faces[36 + k] = CUBE_FACES[k] + 8;
+    }
+    cbvh_mesh mesh;
+    OK(cbvh_bake(vertices, 16, faces, 24, NULL, &mesh));
+    return mesh;
+}
+
 static inline cbvh_pose shift(double x, double y, double z) {
     cbvh_pose pose = CBVH_IDENTITY;
     pose.rows[3] = x;

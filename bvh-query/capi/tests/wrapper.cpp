@@ -188,6 +188,12 @@ void overlaps() {
     const auto depth = querier.penetration(one, one, corner);
     CHECK(depth.lower <= 0.25 && depth.upper >= 0.25 && depth.upper < 0.2525 && !depth.is_spent);
     CHECK(querier.penetration(one, one, poses, {0, 0.1})[0].lower > 0.1 && querier.penetration(one, one, poses)[1].upper == 0);
+    const auto number = querier.signed_distance(one, one, corner);
+    CHECK(number.lower <= -0.25 && number.upper >= -0.25 && number.is_signed && number.normal[0] > 0.9);
+    const auto numbers = querier.signed_distance(one, one, poses);
+    CHECK(std::memcmp(&number, &numbers[0], sizeof number) == 0 && numbers[1].lower <= 2 && numbers[1].upper >= 2);
+    CHECK(querier.signed_distance(one, one, poses, {0, 0.1})[0].upper < -0.1 && numbers[1].point_b[0] == 2.5);
+    FAILS(querier.signed_distance(one, one, corner, {-1}), CBVH_INVALID_ARGUMENT, "relative_gap: ");
     const cbvh::ClashOptions near{2.5, 0.1, 0, 0};
     const auto clash = querier.clash(one, one, poses, near);
     CHECK(clash[0].kind == CBVH_CLASH_OVERLAPPING && clash[1].kind == CBVH_CLASH_NEAR && clash[1].distance == 2);
