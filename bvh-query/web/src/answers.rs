@@ -1,6 +1,6 @@
 //! Makes arrays from answers: one array per field, in the order in which `ts/answers.ts` names them.
 
-use bvh_query::{Clash, ClosestPoint, Contact, Distance, Penetration, Pose, RayHit};
+use bvh_query::{Clash, ClosestPoint, Contact, Distance, Penetration, Pose, RayHit, SignedDistance};
 use js_sys::{Array, Float64Array, Uint8Array, Uint32Array};
 use wasm_bindgen::JsValue;
 
@@ -60,8 +60,8 @@ pub(crate) fn distances(of: &[Option<Distance>]) -> Array {
     .collect()
 }
 
-/// Lower and upper bound, translation, centre and radii of the balls, and whether the visits ended the search. NaN and 0 for
-/// `None`.
+/// Lower and upper bound, translation, common point, radii of the balls about it, and whether the visits ended the search. NaN and 0
+/// for `None`.
 pub(crate) fn penetrations<'a>(of: impl Iterator<Item = Option<&'a Penetration>>) -> Array {
     let found: Vec<Option<&Penetration>> = of.collect();
     let numbers = |part: fn(&Penetration) -> f64| floats(found.iter().map(|of| of.map_or(f64::NAN, part)));
@@ -74,6 +74,24 @@ pub(crate) fn penetrations<'a>(of: impl Iterator<Item = Option<&'a Penetration>>
         places(|depth| depth.point),
         floats(found.iter().flat_map(|of| of.map_or([f64::NAN; 2], |depth| depth.radii))),
         small(found.iter().map(|of| of.is_some_and(|depth| depth.is_spent).into())).into(),
+    ]
+    .into_iter()
+    .collect()
+}
+
+/// Lower and upper bound, normal, points of A and B, translation, whether both have an inside, and whether the visits ended the
+/// search.
+pub(crate) fn signed_distances(of: &[SignedDistance]) -> Array {
+    let places = |part: fn(&SignedDistance) -> [f64; 3]| points(of.iter().map(part));
+    [
+        floats(of.iter().map(|of| of.lower)),
+        floats(of.iter().map(|of| of.upper)),
+        places(|of| of.normal),
+        places(|of| of.point_a),
+        places(|of| of.point_b),
+        places(|of| of.translation),
+        small(of.iter().map(|of| of.is_signed.into())).into(),
+        small(of.iter().map(|of| of.is_spent.into())).into(),
     ]
     .into_iter()
     .collect()

@@ -1,6 +1,6 @@
-//! Where and how deep two meshes overlap, and where a mesh meets itself.
+//! Where and how deep two meshes overlap, how far apart they are if they do not, and where a mesh meets itself.
 
-use crate::answers::{clashes, contacts, floats, ids, penetrations, points, small};
+use crate::answers::{clashes, contacts, floats, ids, penetrations, points, signed_distances, small};
 use crate::arguments::{Answer, pose, refused, rows, same_count, with_querier};
 use crate::mesh::Mesh;
 use crate::pairs::ask;
@@ -25,6 +25,14 @@ pub fn separation(a: &Mesh, b: &Mesh, poses: &Float64Array, directions: &Float64
     Ok(parts.into_iter().collect())
 }
 
+/// Reads when the search for a depth ends.
+fn depth_options(relative_gap: Option<f64>, tolerance: Option<f64>) -> PenetrationOptions {
+    let mut options = PenetrationOptions::new();
+    options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
+    options.tolerance = tolerance;
+    options
+}
+
 /// The parts of depths.
 #[wasm_bindgen]
 pub fn penetration(
@@ -34,11 +42,23 @@ pub fn penetration(
     relative_gap: Option<f64>,
     tolerance: Option<f64>,
 ) -> Answer<Array> {
-    let mut options = PenetrationOptions::new();
-    options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
-    options.tolerance = tolerance;
+    let options = depth_options(relative_gap, tolerance);
     let found = ask([a, b], poses, |querier, [a, b], pose| querier.penetration(a, b, pose, &options))?;
     Ok(penetrations(found.iter().map(Some)))
+}
+
+/// The parts of signed distances.
+#[wasm_bindgen(js_name = signedDistance)]
+pub fn signed_distance(
+    a: &Mesh,
+    b: &Mesh,
+    poses: &Float64Array,
+    relative_gap: Option<f64>,
+    tolerance: Option<f64>,
+) -> Answer<Array> {
+    let options = depth_options(relative_gap, tolerance);
+    let found = ask([a, b], poses, |querier, [a, b], pose| querier.signed_distance(a, b, pose, &options))?;
+    Ok(signed_distances(&found))
 }
 
 /// Reads what counts as a clash.

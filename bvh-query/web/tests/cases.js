@@ -12,6 +12,12 @@ const CUBE_FACES = [
 
 const at = (x, y, z) => [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z];
 const cubeOf = (cbvh) => cbvh.Mesh.bake(CUBE, CUBE_FACES);
+/** That cube and another one beyond its right side in one object, which is closed but not convex. */
+const pairOf = (cbvh) =>
+    cbvh.Mesh.bake(
+        [...CUBE, ...CUBE.map((x, k) => (k % 3 === 0 ? x + 2.5 : x))],
+        [...CUBE_FACES, ...CUBE_FACES.map((corner) => corner + 8)],
+    );
 
 /** A random rotation, of a quaternion, and a translation. */
 function somewhere(cbvh, source, reach, count = 1) {
@@ -48,6 +54,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.patches(b, pose, { tolerance: x, maxContacts: 1000 }),
         () => a.separation(b, pose, [x, y, z]),
         () => a.penetration(b, pose, { relativeGap: x, tolerance: y }),
+        () => a.signedDistance(b, pose, { relativeGap: x, tolerance: y }),
         () => a.clash(b, pose, { clearance: x, tolerance: y, relativeGap: z, visits: 1000 }),
         () => a.selfContacts(),
         () => a.openEdges(),
@@ -128,7 +135,10 @@ export const cases = {
         const depth = cube.penetration(cube, corner);
         ok(depth.lower <= 0.5 && depth.lower > 0.49 && depth.upper >= 0.5 && depth.upper < 0.505, "bounds around the depth");
         equal(cube.relation(cube, moved(depth.translation)), Relation.APART);
-        near(depth.radii[0] + depth.radii[1], depth.lower, 1e-6, "radii");
+        equal(depth.radii, [0, 0]);
+        const searched = cube.penetration(pairOf(cbvh), corner);
+        ok(searched.lower > 0.25 && searched.lower <= 0.5 && searched.upper >= 0.5 && searched.upper < 0.505, "a search");
+        near(searched.radii[0] + searched.radii[1], searched.lower, 1e-6, "radii");
         equal(cube.penetration(cube, at(9, 0, 0)).upper, 0);
         ok(cube.penetration(cube, corner, { tolerance: 0.01 }).lower > 0.01, "deeper than the tolerance");
         const both = cube.penetrationEach(cube, [...corner, ...at(9, 0, 0)]);
@@ -191,6 +201,55 @@ export const cases = {
         equal(own.kind, [SelfContactKind.CROSSING, SelfContactKind.DUPLICATE, SelfContactKind.CROSSING]);
     },
 
+    "a signed distance is a distance or minus a depth": (cbvh) => {
+        const { box, cloud, Mesh, Relation } = cbvh;
+        // A block passes through another one along x, from one side to the other: the number is a known function of the way.
+        const [a, b] = [box([2, 4, 4]), box([1, 1, 1])];
+        const way = Array.from({ length: 49 }, (_, step) => (step - 24) / 8);
+        const all = a.signedDistanceEach(b, way.flatMap((x) => at(x, 0.25, 0)));
+        equal([all.normal.length, all.pointA.length, all.pointB.length, all.translation.length], [147, 147, 147, 147]);
+        const names = ["normal", "pointA", "pointB", "translation"];
+        way.forEach((x, k) => {
+            const [number, expected] = [a.signedDistance(b, at(x, 0.25, 0)), Math.abs(x) - 1.5];
+            ok(number.lower <= expected && expected <= number.upper, `bounds around ${expected}`);
+            ok(number.upper - number.lower < 1e-9, "bounds that are near each other");
+            equal([number.isSigned, number.isSpent, all.isSigned[k], all.isSpent[k]], [true, false, 1, 0]);
+            equal([number.lower, number.upper], [all.lower[k], all.upper[k]]);
+            names.forEach((name) => equal(number[name], all[name].slice(3 * k, 3 * k + 3), name));
+            ok(x === 0 || Math.abs(number.normal[0] - Math.sign(x)) < 1e-9, `a normal along x, found ${number.normal}`);
+            const [dx, dy, dz] = number.translation;
+            equal(a.relation(b, at(x + dx, 0.25 + dy, dz)) === Relation.APART, number.lower < 0 || expected > 0);
+            const apart = number.normal.reduce((sum, n, axis) => sum + n * (number.pointB[axis] - number.pointA[axis]), 0);
+            ok(Math.abs(apart - expected) < 1e-9, `points ${expected} apart along the normal, found ${apart}`);
+        });
+        // Two cubes in one mesh are not convex. The options are those of the depth.
+        const [cube, pair] = [cubeOf(cbvh), pairOf(cbvh)];
+        const deep = at(0.75, 0.25, 0.125);
+        for (const options of [{}, { relativeGap: 100 }, { tolerance: 0.01 }]) {
+            const [number, depth] = [cube.signedDistance(pair, deep, options), cube.penetration(pair, deep, options)];
+            equal([number.lower, number.upper, number.translation], [-depth.upper, -depth.lower, depth.translation]);
+        }
+        const [number, distance] = [cube.signedDistance(pair, at(0, 9, 1)), cube.distance(pair, at(0, 9, 1))];
+        equal([number.lower, number.upper, number.pointA], [distance.lower, distance.upper, distance.pointA]);
+        // What has no inside has a distance only, and the answer says so; a radius gives an inside to a point.
+        const open = Mesh.bake(CUBE, CUBE_FACES.slice(3));
+        const [point, ball] = [cloud([0, 0, 0]), cloud([0, 0, 0], 0.5)];
+        const cases = [
+            [open, 4, 2, false],
+            [open, 1.5, 0, false],
+            [point, 2, 1, false],
+            [point, 0.5, 0.5, false],
+            [ball, 2, 0.5, true],
+            [ball, 1.25, -0.25, true],
+        ];
+        for (const [other, x, expected, isSigned] of cases) {
+            const { lower, upper, translation, ...found } = cube.signedDistance(other, at(x, 0, 0));
+            ok(lower <= expected && expected <= upper && upper - lower < 1e-9, `bounds around ${expected}`);
+            equal([found.isSigned, translation.every((by) => by === 0)], [isSigned, expected >= 0]);
+        }
+        equal(cube.signedDistanceEach(cube, []).isSigned, []);
+    },
+
     "parts clash as their gap and their depth say": (cbvh) => {
         const { ClashClass, Mesh, Relation, Scene } = cbvh;
         const [cube, same] = [cubeOf(cbvh), cubeOf(cbvh)];
@@ -231,8 +290,8 @@ export const cases = {
         equal([each.distance, each.point.length, each.depth.translation.length, each.depth.isSpent], [[Infinity, 0.125, 0, 0], 12, 12, [0, 0, 0, 0]]);
         equal([...each.depth.upper].map(Number.isNaN), [true, true, false, false]);
         equal(each.depth.upper[3], cube.clash(cube, at(1.9375, 0.25, 0.125), options).depth.upper);
-        // Without visits, the depth that two boxes have stays unknown.
-        const spent = cube.clash(cube, at(1.9375, 0.25, 0.125), { ...options, visits: 200 });
+        // Without visits, the depth of what is not convex stays unknown.
+        const spent = cube.clash(pairOf(cbvh), at(1.9375, 0.25, 0.125), { ...options, visits: 200 });
         equal([ClashClass[spent.kind], spent.depth.isSpent], ["UNDECIDED", true]);
         ok(spent.depth.lower <= 0.0625 && spent.depth.upper >= 0.0625, "bounds around the depth");
         const gap = cube.clash(cube, at(2 + 2 ** -10, 0.25, 0.125), options);
@@ -712,6 +771,10 @@ export const cases = {
             [() => cube.penetration(cube, at(0, 0, 0), { tolerance: -1 }), /^tolerance: expected/],
             [() => cube.penetration(cube, at(0, 0, 0), { tolerance: "1" }), "tolerance: expected a number, found a string"],
             [() => cube.penetration(Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]), at(0, 0, 0)), /^expected closed objects/],
+            [() => cube.signedDistance(cube, at(0, 0, 0), { relativeGap: 0 }), /^relative_gap: expected a finite part above 0/],
+            [() => cube.signedDistance(cube, at(0, 0, 0), { tolerance: -1 }), /^tolerance: expected/],
+            [() => cube.signedDistance(cube, at(0, 0, 0), { tolerance: "1" }), "tolerance: expected a number, found a string"],
+            [() => cube.signedDistance(gone, at(0, 0, 0)), "other: expected a Mesh in use, found one that was freed"],
             [() => cube.clash(cube, at(0, 0, 0), { clearance: -1 }), /^clearance: expected a finite length of at least 0/],
             [() => cube.clash(cube, at(0, 0, 0), { tolerance: NaN }), /^tolerance: expected a finite depth of at least 0/],
             [() => cube.clash(cube, at(0, 0, 0), { relativeGap: 0 }), /^relative_gap: expected a finite part above 0/],

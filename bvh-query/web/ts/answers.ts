@@ -120,9 +120,10 @@ export interface Penetration {
     upper: number;
     /** A translation of the other mesh, after which interiors are disjoint. */
     translation: Float64Array;
-    /** What proves `lower`: a ball about this point is inside this mesh, and another one about it inside the other mesh. */
+    /** A point in both meshes, in the frame of the first, where `lower` is above 0. */
     point: Float64Array;
-    /** The radii of both balls. Their sum is `lower`, but for roundings. */
+    /** The radii of two balls about the point, one inside each mesh, which prove `lower`: it is their sum, but for roundings. Both are
+     * 0 for meshes that are known to be convex, whose bounds have another proof. */
     radii: Float64Array;
     /** Whether the search made all the visits that it may make. Only `clash` limits them. */
     isSpent: boolean;
@@ -136,6 +137,45 @@ export interface Penetrations {
     translation: Float64Array;
     point: Float64Array;
     radii: Float64Array;
+    isSpent: Uint8Array;
+}
+
+/** How far apart two meshes are or, below zero, how deep they overlap, in mesh units. */
+export interface SignedDistance {
+    /** The signed distance is at least this. */
+    lower: number;
+    /** The signed distance is at most this. */
+    upper: number;
+    /** The direction in which the other mesh moves away from the first, at length 1, in the frame of the first: from the closest point
+     * on the first to that on the other or, where they overlap, along `translation`. 0 where none is known, as for meshes that
+     * touch and have no depth. */
+    normal: Float64Array;
+    /** The closest point on the first mesh, in its frame, or, where they overlap, the one that the other touches after the
+     * translation. */
+    pointA: Float64Array;
+    /** The closest point on the other mesh, in the frame of the first, or, where they overlap, the one that touches `pointA` after the
+     * translation. */
+    pointB: Float64Array;
+    /** Where they overlap, a translation of the other mesh, in the frame of the first, after which interiors are disjoint. Its length
+     * is -`lower`, but for roundings. Else 0. */
+    translation: Float64Array;
+    /** Whether both meshes have an inside: they are closed, and have a radius or triangles with area. If not, they have no depth, and
+     * the number is their distance, 0 where they touch. */
+    isSigned: boolean;
+    /** Whether the search for a depth made all the visits that it may make. Only `clash` limits them. */
+    isSpent: boolean;
+}
+
+/** N answers of the type `SignedDistance`: numbers of length N, normals, points and translations of length 3 N, and 1 or 0 for
+ * `isSigned` and `isSpent`. */
+export interface SignedDistances {
+    lower: Float64Array;
+    upper: Float64Array;
+    normal: Float64Array;
+    pointA: Float64Array;
+    pointB: Float64Array;
+    translation: Float64Array;
+    isSigned: Uint8Array;
     isSpent: Uint8Array;
 }
 
@@ -417,6 +457,11 @@ export const separations = ([lower, upper, translation]: unknown[]): Separations
 export const penetrations = ([lower, upper, translation, point, radii, isSpent]: unknown[]): Penetrations =>
     ({ lower, upper, translation, point, radii, isSpent }) as Penetrations;
 
+export const signedDistances = (parts: unknown[]): SignedDistances => {
+    const [lower, upper, normal, pointA, pointB, translation, isSigned, isSpent] = parts;
+    return { lower, upper, normal, pointA, pointB, translation, isSigned, isSpent } as SignedDistances;
+};
+
 export const clashes = ([kind, relation, distance, point, depth]: unknown[]): Clashes =>
     ({ kind, relation, distance, point, depth: penetrations(depth as unknown[]) }) as Clashes;
 
@@ -488,6 +533,13 @@ export const onlyBounds = <T extends { lower: Float64Array; upper: Float64Array 
 
 /** Takes the only element of an answer with one depth. */
 export const onlyPenetration = (of: Penetrations): Penetration => ({ ...onlyBounds(of), isSpent: of.isSpent[0] === 1 });
+
+/** Takes the only element of an answer with one signed distance. */
+export const onlySignedDistance = (of: SignedDistances): SignedDistance => ({
+    ...onlyBounds(of),
+    isSigned: of.isSigned[0] === 1,
+    isSpent: of.isSpent[0] === 1,
+});
 
 /** Takes the only element of an answer with one clash. */
 export function onlyClash({ kind, relation, distance, point, depth }: Clashes): Clash {

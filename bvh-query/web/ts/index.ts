@@ -30,6 +30,8 @@ export type {
     SelfContacts,
     Separation,
     Separations,
+    SignedDistance,
+    SignedDistances,
 } from "./answers.js";
 export { ClashClass, MotionKind, RegionKind, Relation, SelfContactKind, Side } from "./answers.js";
 export type { Bytes, Integers, Numbers } from "./arguments.js";

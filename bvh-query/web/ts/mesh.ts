@@ -19,6 +19,8 @@ import type {
     SelfContacts,
     Separation,
     Separations,
+    SignedDistance,
+    SignedDistances,
 } from "./answers.js";
 import {
     bytes,
@@ -159,6 +161,11 @@ const optional = (value: number | undefined, name: string) => (value === undefin
 export function limits(options: MotionOptions): [number, number | undefined] {
     const { clearance = 0, tolerance } = options;
     return [float(clearance, "clearance"), optional(tolerance, "tolerance")];
+}
+
+/** Reads when the search for a depth ends. */
+function depthLimits(options: PenetrationOptions): [number?, number?] {
+    return [optional(options.relativeGap, "relativeGap"), optional(options.tolerance, "tolerance")];
 }
 
 /** Reads what counts as a clash. */
@@ -436,8 +443,10 @@ export class Mesh extends Handle<raw.Mesh> {
 
     /**
      * How deep do they overlap? Certified bounds of the length of the shortest translation of `other` after which interiors are
-     * disjoint, and such a translation. All numbers are 0 if the meshes are apart. For convex meshes, `upper` is mostly within a
-     * per cent of the depth, and `lower` more than half of it. It takes up to some milliseconds. Both meshes must be closed.
+     * disjoint, and such a translation. All numbers are 0 if the meshes are apart. For convex meshes of one object and at most 4096
+     * triangles, the bounds are as near each other as the options ask for, down to some roundings; for others, `lower` is mostly more
+     * than half of the depth. It takes some microseconds for such convex meshes, and up to some milliseconds for others. Both meshes
+     * must be closed.
      */
     penetration(other: Mesh, pose: Numbers, options: PenetrationOptions = {}): Penetration {
         return answers.onlyPenetration(this.penetrationEach(other, onePose(pose), options));
@@ -445,9 +454,25 @@ export class Mesh extends Handle<raw.Mesh> {
 
     /** `penetration` for N poses. */
     penetrationEach(other: Mesh, poses: Numbers, options: PenetrationOptions = {}): Penetrations {
-        const gap = optional(options.relativeGap, "relativeGap");
-        const tolerance = optional(options.tolerance, "tolerance");
-        return answers.penetrations(this.#pair(other, poses, (a, b, array) => raw.penetration(a, b, array, gap, tolerance)));
+        const limits = depthLimits(options);
+        return answers.penetrations(this.#pair(other, poses, (a, b, array) => raw.penetration(a, b, array, ...limits)));
+    }
+
+    /**
+     * How far apart are they or, below zero, how deep do they overlap? Certified bounds of the distance where they are apart, and of
+     * minus the depth of `penetration` where they overlap or one is inside the other, with a direction and two points. Where they
+     * touch, 0 is between the bounds, which are some roundings apart. The options are those of the depth. Meshes need not be
+     * closed: see `isSigned`. It takes the time of `distance` and of `sides` for a few points or, where they overlap, that of
+     * `penetration`.
+     */
+    signedDistance(other: Mesh, pose: Numbers, options: PenetrationOptions = {}): SignedDistance {
+        return answers.onlySignedDistance(this.signedDistanceEach(other, onePose(pose), options));
+    }
+
+    /** `signedDistance` for N poses. */
+    signedDistanceEach(other: Mesh, poses: Numbers, options: PenetrationOptions = {}): SignedDistances {
+        const limits = depthLimits(options);
+        return answers.signedDistances(this.#pair(other, poses, (a, b, array) => raw.signedDistance(a, b, array, ...limits)));
     }
 
     /**
