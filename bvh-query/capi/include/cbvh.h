@@ -629,7 +629,7 @@ typedef struct cbvh_penetration {
     /* A point in both meshes, in A's frame, where `lower` is above 0. */
     double point[3];
     /* The radii of two balls about the point, one inside A and one inside B, which prove `lower`: it is their sum, but for
-     * roundings. Both are 0 for meshes that are known to be convex, whose bounds have another proof. */
+     * roundings. Both are 0 where the meshes or parts of them are known to be convex, which proves more. */
     double radii[2];
     /* 1 if the budget of the querier ended the search, else 0. */
     int32_t is_spent;
@@ -649,7 +649,7 @@ typedef struct cbvh_penetration_options {
  * disjoint. All numbers are 0 where the meshes are apart. Where they only touch, `lower` is 0 and `upper` some
  * roundings. Both bounds are certain. For convex meshes of one object and at most 4096 triangles, they are as near each
  * other as the options ask for, down to some roundings. For others, the search ends when it has tried all it knows:
- * `lower` is mostly more than half of the depth, and far less for meshes that are thin where they cross. One core is
+ * `lower` is mostly more than two thirds of the depth, and far less for meshes that are thin where they cross. One core is
  * used. It takes some microseconds for such convex meshes, and once up to 25 ms to find out that a mesh is one. For
  * others, it takes up to a millisecond for meshes of a hundred triangles, and some for large ones. If the budget of the
  * querier ends the search, the bounds so far are the answer; CBVH_LIMIT if it does not even suffice to find out whether

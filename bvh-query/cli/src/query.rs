@@ -40,7 +40,7 @@ between two bounds, and then the translation, 0 where they are apart. Where a me
 
 --json prints one object per pose: pose, its number in the file, from 0; poses, the name of the file, if there are several; \
 and collide, within (true or false), relation, contacts and pairs (the triangles), lower, upper, translation, point and radii (what \
-proves lower: a ball about the point in each mesh, unless both are convex), for signed also normal (the way of B out of A) and \
+proves lower: a ball about the point in each mesh, unless more is known of convex parts, where radii are 0), for signed also normal (the way of B out of A) and \
 signed (false if a mesh encloses nothing), or distance, lower, upper, point_a, \
 point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies between lower and upper, and points are in the \
 frame of A. If a file has moved vertices, given_lower and given_upper are bounds for the meshes that were given.

@@ -4,7 +4,6 @@ use super::intersection::{are_collinear, heights};
 use super::{Point, Triangle, cross, dot, subtract};
 use crate::numerics::UNIT_ROUNDOFF;
 use bvh_format::vec3::length;
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// What the triangles of an object enclose.
@@ -41,17 +40,19 @@ impl ConvexSolid {
     pub(crate) fn of_surface(triangles: &[Triangle]) -> Option<Self> {
         // In an order that does not depend on that of the triangles, so that depths do not either.
         let bits = |corner: &Point| corner.map(f64::to_bits);
-        let distinct: BTreeSet<[u64; 3]> = triangles.as_flattened().iter().map(bits).collect();
+        let mut distinct: Vec<[u64; 3]> = triangles.as_flattened().iter().map(bits).collect();
+        distinct.sort_unstable();
+        distinct.dedup();
         let vertices: Vec<Point> = distinct.iter().map(|vertex| vertex.map(f64::from_bits)).collect();
-        let numbers: BTreeMap<[u64; 3], u32> = distinct.into_iter().zip(0..).collect();
-        let faces = triangles.iter().map(|corners| corners.each_ref().map(|corner| numbers[&bits(corner)]));
-        let mut edges = BTreeSet::new();
-        for [p, q, r] in faces {
-            if ![(p, q), (q, r), (r, p)].into_iter().all(|edge| edges.insert(edge)) {
-                return None;
-            }
+        let mut edges: Vec<[u32; 2]> = Vec::new();
+        for corners in triangles {
+            let number = |corner| distinct.partition_point(|vertex| *vertex < bits(corner)) as u32;
+            let [p, q, r] = corners.each_ref().map(number);
+            edges.extend([[p, q], [q, r], [r, p]]);
         }
-        if !edges.iter().all(|&(from, to)| edges.contains(&(to, from))) {
+        edges.sort_unstable();
+        let is_twice = edges.windows(2).any(|pair| pair[0] == pair[1]);
+        if is_twice || !edges.iter().all(|&[from, to]| edges.binary_search(&[to, from]).is_ok()) {
             return None;
         }
         let count = vertices.len() as f64;
@@ -68,12 +69,12 @@ impl ConvexSolid {
             return None;
         }
         let mut starts: Vec<u32> = vec![0; vertices.len() + 1];
-        edges.iter().for_each(|&(from, _)| starts[from as usize + 1] += 1);
+        edges.iter().for_each(|edge| starts[edge[0] as usize + 1] += 1);
         for vertex in 0..vertices.len() {
             starts[vertex + 1] += starts[vertex];
         }
         // The edges are in the order of the vertices that they come from.
-        let links = edges.into_iter().map(|(_, to)| to).collect();
+        let links = edges.iter().map(|edge| edge[1]).collect();
         Some(Self { vertices, starts, links, centre, inner, reach })
     }
 

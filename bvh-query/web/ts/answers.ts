@@ -123,7 +123,7 @@ export interface Penetration {
     /** A point in both meshes, in the frame of the first, where `lower` is above 0. */
     point: Float64Array;
     /** The radii of two balls about the point, one inside each mesh, which prove `lower`: it is their sum, but for roundings. Both are
-     * 0 for meshes that are known to be convex, whose bounds have another proof. */
+     * 0 where the meshes or parts of them are known to be convex, which proves more. */
     radii: Float64Array;
     /** Whether the search made all the visits that it may make. Only `clash` limits them. */
     isSpent: boolean;

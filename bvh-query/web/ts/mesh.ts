@@ -445,7 +445,7 @@ export class Mesh extends Handle<raw.Mesh> {
      * How deep do they overlap? Certified bounds of the length of the shortest translation of `other` after which interiors are
      * disjoint, and such a translation. All numbers are 0 if the meshes are apart. For convex meshes of one object and at most 4096
      * triangles, the bounds are as near each other as the options ask for, down to some roundings; for others, `lower` is mostly more
-     * than half of the depth. It takes some microseconds for such convex meshes, and up to some milliseconds for others. Both meshes
+     * than two thirds of the depth. It takes some microseconds for such convex meshes, and up to some milliseconds for others. Both meshes
      * must be closed.
      */
     penetration(other: Mesh, pose: Numbers, options: PenetrationOptions = {}): Penetration {

@@ -162,7 +162,7 @@ class Penetration(NamedTuple):
       (3,) or (N, 3).
     - ``point``: a point in both meshes, in the frame of the first, where ``lower`` is above 0. Shape (3,) or (N, 3).
     - ``radii``: the radii of two balls about the point, one inside each mesh, which prove ``lower``: their sum, but for
-      roundings. Both are 0 for convex meshes, of which more is known. Shape (2,) or (N, 2).
+      roundings. Both are 0 where convex meshes or parts prove more. Shape (2,) or (N, 2).
     - ``is_spent``: whether the budget or the most visits ended the search. Shape () or (N,).
     """
 

@@ -1,7 +1,7 @@
 //! How deep two shapes overlap: the shortest translation of B that makes interiors disjoint, between two certified bounds.
 //!
 //! Of two convex solids, both follow from their Minkowski difference ([`super::convex`]). Of others, the lower one follows from two
-//! balls about one point ([`super::balls`]), and the upper one from places that exact arithmetic calls free ([`super::free`]). A way that comes free ends at a facet of the obstacle, and the shortest way beyond the planes of such
+//! balls about one point ([`super::balls`]) or convex pieces ([`super::pieces`]), and the upper one from places that exact arithmetic calls free ([`super::free`]). A way that comes free ends at a facet of the obstacle, and the shortest way beyond the planes of such
 //! facets is the next one to try, as in PolyDepth (Je, Tang, Lee, Lee, Kim, ACM Transactions on Graphics 31(1), 2012). No search
 //! of this kind finds the least depth of all meshes, which is why the bounds say how good the answer is.
 
@@ -45,7 +45,7 @@ pub struct Penetration {
     /// A point in both shapes, in A's frame, where `lower` is above 0.
     pub point: [f64; 3],
     /// The radii of two balls about the point, one inside A and one inside B, which prove `lower`: their sum, but for roundings. Both
-    /// are 0 for convex solids, of which more is known.
+    /// are 0 where convex solids, or convex pieces of the shapes, prove more.
     pub radii: [f64; 2],
     /// Whether the budget ended the search.
     pub is_spent: bool,
@@ -133,8 +133,9 @@ impl Querier {
     /// the pose with `translation` added.
     ///
     /// For convex shapes of one object and at most 4096 triangles, with a radius or without, the bounds are as near each other as the
-    /// options ask for, down to some roundings of the size. For others, `lower` is certain because of two balls about one point; it is
-    /// mostly more than half of the depth, and far less for shapes that are thin where they cross. Where a shape fits another one without a gap, like a peg in its hole, the depth is not a
+    /// options ask for, down to some roundings of the size. For others, `lower` is certain because of convex
+    /// pieces of both (up to 1024 triangles) or two balls about one point; it is mostly more than two thirds of the depth, and far less
+    /// for shapes that are thin where they cross. Where a shape fits another one without a gap, like a peg in its hole, the depth is not a
     /// continuous function of the pose: then `lower` is about 0, and `upper` how far the peg has to be pulled. All numbers have
     /// the same bits on all backends.
     ///
@@ -256,7 +257,7 @@ impl<'a> DepthSearch<'a> {
     fn run(&mut self, querier: &mut Querier) -> Result<(), QueryError> {
         let line = self.line;
         // Where surfaces hardly overlap, the contact that stays the longest on this way mostly tells all that there is to know.
-        let direction = self.from_middle_to_middle();
+        let direction = self.middle_to_middle();
         self.descend(querier, direction)?;
         if !self.is_done() {
             let line = line.along(direction);
@@ -306,7 +307,7 @@ impl<'a> DepthSearch<'a> {
     }
 
     /// Returns the direction from the middle of A's box to that of B's.
-    fn from_middle_to_middle(&self) -> Point {
+    fn middle_to_middle(&self) -> Point {
         let [[lo_a, hi_a], [lo_b, hi_b]] =
             [self.line.a.into(), self.line.b.at(self.line.pose)].map(|shape| bounds(&shape));
         let way = [0, 1, 2].map(|k| (lo_b[k] - lo_a[k]) + (hi_b[k] - hi_a[k]));

@@ -14,6 +14,7 @@ use crate::query::depth::polytope::{Corner, Polytope};
 use crate::query::depth::translation::Translation;
 use crate::query::exact::placed;
 use crate::query::querier::Querier;
+use std::cmp::Ordering;
 
 /// The most triangles of a shape that pieces are made of.
 const MAX_TRIANGLES: u64 = 1024;
@@ -89,7 +90,9 @@ fn piece(triangles: Vec<Triangle>, centre: &Point, margin: f64) -> Vec<Point> {
         .into_iter()
         .map(|triangle| (triangle_distance(&triangle, &[*centre; 3]).distance, triangle))
         .collect();
-    by_distance.sort_by(|x, y| x.0.total_cmp(&y.0));
+    // Of equally near ones, the order does not depend on the file.
+    let order = |x: &Triangle, y: &Triangle| x.partial_cmp(y).unwrap_or(Ordering::Equal);
+    by_distance.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then_with(|| order(&x.1, &y.1)));
     for (distance, triangle) in by_distance {
         if !reaches_into(&triangle, &planes, centre, 1.5 * margin) {
             continue;
