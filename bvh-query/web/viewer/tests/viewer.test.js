@@ -19,7 +19,7 @@ import { box, overlaps, ring, scene } from "./meshes.js";
 
 const COMMAND = process.env.CBVH;
 const WITHOUT = COMMAND === undefined && "CBVH names no command";
-const MAX_BYTES = 1_550_000;
+const MAX_BYTES = 1_600_000;
 const folder = mkdtempSync(path.join(os.tmpdir(), "cbvh-page-"));
 const pictures = process.env.CBVH_PICTURES;
 if (pictures !== undefined) {
