@@ -650,7 +650,7 @@ typedef struct cbvh_penetration_options {
  * roundings. Both bounds are certain. For convex meshes of one object and at most 4096 triangles, they are as near each
  * other as the options ask for, down to some roundings. For others, the search ends when it has tried all it knows:
  * `lower` is mostly more than two thirds of the depth, and far less for meshes that are thin where they cross. One core is
- * used. It takes some microseconds for such convex meshes, and once up to 25 ms to find out that a mesh is one. For
+ * used. It takes some microseconds for such convex meshes, and once up to 0.2 s to find out that a mesh is one. For
  * others, it takes up to a millisecond for meshes of a hundred triangles, and some for large ones. If the budget of the
  * querier ends the search, the bounds so far are the answer; CBVH_LIMIT if it does not even suffice to find out whether
  * the meshes are apart. CBVH_INVALID_ARGUMENT for a mesh that is not closed, and for a file that was baked without

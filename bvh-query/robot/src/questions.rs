@@ -27,7 +27,8 @@ pub struct RobotDistance {
 pub struct RobotSignedDistance {
     /// The names of both.
     pub bodies: [String; 2],
-    /// How far they are apart or, below zero, how deep they overlap, with points, normal and translation in the world.
+    /// How far they are apart or, below zero, how deep they overlap, with points, normal and translation turned into the world, which
+    /// rounds them.
     pub nearest: SignedDistance,
 }
 
@@ -84,7 +85,7 @@ impl Robot {
     }
 
     /// Returns the two bodies with the least signed distance: those that overlap most or, where none do, the nearest ones. `None` if
-    /// there are no pairs. It is between the bounds of these two, whose lower one is the least. A body inside another one overlaps it,
+    /// there are no pairs. No other two have a lower one, but for roundings and how far bounds of depths are apart. A body inside another one overlaps it,
     /// unless one of them is not closed.
     ///
     /// Cost: that of [`Robot::distance`], and a depth for each pair that overlaps.

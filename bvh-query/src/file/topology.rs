@@ -31,6 +31,11 @@ impl<'a> Topology<'a> {
         self.of_object.components(self.bytes).iter().map(|place| place.get())
     }
 
+    /// Returns whether each stored triangle counts once, in its own orientation.
+    pub(crate) fn counts_each_once(&self) -> bool {
+        self.nets.is_empty()
+    }
+
     /// Returns the net of a stored triangle: how many equal triangles of the input have its
     /// orientation, itself included, less the number of those that have the opposite one.
     ///

@@ -16,17 +16,6 @@ impl Shape<'_> {
     /// # Errors
     /// [`QueryError::Damaged`] with the first rule that does not hold. Triangles of earlier pages have been visited.
     pub fn visit_triangles(self, mut visit: impl FnMut(u32, [[f64; 3]; 3])) -> Result<(), QueryError> {
-        self.visit_triangles_until(|id, corners| {
-            visit(id, corners);
-            false
-        })
-    }
-
-    /// Calls `visit` as [`Shape::visit_triangles`] does, until it returns true.
-    pub(crate) fn visit_triangles_until(
-        self,
-        mut visit: impl FnMut(u32, [[f64; 3]; 3]) -> bool,
-    ) -> Result<(), QueryError> {
         let bvh = self.bvh();
         let has_ids = bvh.layout().has_ids();
         for object in self.objects() {
@@ -46,10 +35,32 @@ impl Shape<'_> {
                             place.wrapping_add(lane as u32)
                         };
                         let corners = vertices.triangle(packet.into(), lane);
-                        let is_enough = visit(id, corners);
-                        if is_enough || bvh.duplicates_of(id)?.any(|duplicate| visit(duplicate, corners)) {
-                            return Ok(());
-                        }
+                        visit(id, corners);
+                        bvh.duplicates_of(id)?.for_each(|duplicate| visit(duplicate, corners));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Calls `visit` with the corners of each stored triangle until it returns true. Duplicates count once: a damaged file may state
+    /// any number of them.
+    pub(crate) fn visit_stored_until(
+        self,
+        mut visit: impl FnMut([[f64; 3]; 3]) -> bool,
+    ) -> Result<(), QueryError> {
+        let bvh = self.bvh();
+        for object in self.objects() {
+            for number in object.pages() {
+                let page = bvh.page(object, number)?;
+                let block = bvh.leaf_block(object, &page)?;
+                let in_page = page.header().packets.get().into();
+                let vertices =
+                    VertexBlock::new(object.triangle_encoding(), object.vertices(), block, in_page);
+                for (packet, count) in packets(&page) {
+                    if (0..count).any(|lane| visit(vertices.triangle(packet.into(), lane))) {
+                        return Ok(());
                     }
                 }
             }

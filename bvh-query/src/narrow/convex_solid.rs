@@ -17,6 +17,9 @@ pub(crate) enum Enclosed {
     Unknown,
 }
 
+/// The most exact signs that are found, in some 0.15 s. Faces that are divided very finely need more.
+const MAX_EXACT_SIGNS: u32 = 1 << 16;
+
 /// The least radius of a ball inside, as a part of how far the vertices are from its centre. Rounding may bend thinner ones too much.
 const MIN_THICKNESS: f64 = 1.0 / (1 << 16) as f64;
 
@@ -59,10 +62,10 @@ impl ConvexSolid {
         let centre = [0, 1, 2].map(|k| vertices.iter().map(|v| v[k] / count).sum());
         let reach = vertices.iter().map(|v| length(subtract(*v, centre))).fold(0.0, f64::max)
             * (1.0 + 8.0 * UNIT_ROUNDOFF);
-        let mut inner = f64::INFINITY;
+        let (mut inner, mut signs) = (f64::INFINITY, MAX_EXACT_SIGNS);
         for triangle in triangles {
-            inner =
-                inner.min(Plane::of(triangle, reach).supports(&vertices, triangle)?.distance_above(&centre));
+            let plane = Plane::of(triangle, reach).supports(&vertices, triangle, &mut signs)?;
+            inner = inner.min(plane.distance_above(&centre));
         }
         // Without faces it is infinite, and it is NaN where numbers are too large.
         if !inner.is_finite() || inner < MIN_THICKNESS * reach {
@@ -127,14 +130,19 @@ impl Plane {
         dot(self.normal, subtract(*point, self.through))
     }
 
-    /// Returns itself if no vertex is beyond it.
-    fn supports(self, vertices: &[Point], triangle: &Triangle) -> Option<Self> {
-        let is_beyond = |vertex: &Point| {
+    /// Returns itself if no vertex is beyond it, and no more exact signs are needed to say so than are left.
+    fn supports(self, vertices: &[Point], triangle: &Triangle, signs: &mut u32) -> Option<Self> {
+        for vertex in vertices {
             let height = self.height(vertex);
-            height > self.error || height >= -self.error && heights(triangle, &[*vertex])[0] > 0.0
-        };
-        let is_supporting = !vertices.iter().any(is_beyond);
-        is_supporting.then_some(self)
+            if height < -self.error {
+                continue;
+            }
+            *signs = signs.checked_sub(1)?;
+            if height > self.error || heights(triangle, &[*vertex])[0] > 0.0 {
+                return None;
+            }
+        }
+        Some(self)
     }
 
     /// Returns how far a point is below the plane at least; infinite for a triangle without area, which has none.

@@ -246,6 +246,11 @@ impl Scene {
     /// another one are not tested.
     pub fn distance(&mut self) -> Result<Option<SceneDistance>, SceneError> {
         self.start();
+        self.nearest_pair()
+    }
+
+    /// Goes on with a question that asks for the nearest pair.
+    pub(super) fn nearest_pair(&mut self) -> Result<Option<SceneDistance>, SceneError> {
         let mut nearest = None;
         // The pair that was nearest in the last question is likely to be near. Else the one with the nearest boxes is, and a
         // distance says how near other boxes have to be.

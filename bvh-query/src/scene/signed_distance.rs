@@ -2,7 +2,6 @@
 
 use crate::query::depth::penetration::PenetrationOptions;
 use crate::query::depth::signed_distance::SignedDistance;
-use crate::query::probe::relation::Relation;
 use crate::scene::pair_questions::ScenePair;
 use crate::scene::{Scene, SceneError};
 
@@ -17,8 +16,8 @@ pub struct SceneSignedDistance {
 }
 
 impl Scene {
-    /// Returns the least signed distance of all pairs, with its pair; `None` if there are no pairs. It is between the bounds of that
-    /// pair, whose lower one is the least.
+    /// Returns the signed distance of the pair that overlaps most, by its lower bound, or else of the nearest pair; `None` if there
+    /// are no pairs. That of any other pair is at least that lower bound, but for roundings of distances.
     ///
     /// Cost: that of [`Scene::relations`], and a depth for each pair that overlaps; where none does, that of [`Scene::distance`].
     ///
@@ -30,17 +29,15 @@ impl Scene {
     ) -> Result<Option<SceneSignedDistance>, SceneError> {
         options.check()?;
         let overlaps = self.each_near(0.0, false, |querier, pair| {
-            if querier.relation(pair.a, pair.b, &pair.pose)? == Relation::Apart {
-                return Ok(None);
-            }
-            let nearest = querier.signed_distance(pair.a, pair.b, &pair.pose, options)?;
-            Ok((nearest.lower <= 0.0).then_some(SceneSignedDistance { pair: pair.ids, nearest }))
+            let found = querier.signed_unless_apart(pair.a, pair.b, &pair.pose, options)?;
+            let found = found.filter(|nearest| nearest.lower <= 0.0);
+            Ok(found.map(|nearest| SceneSignedDistance { pair: pair.ids, nearest }))
         })?;
         let first_of = |x: SceneSignedDistance, y| if least(&y) < least(&x) { y } else { x };
         if let Some(deepest) = overlaps.into_iter().reduce(first_of) {
             return Ok(Some(deepest));
         }
-        let Some(held) = self.distance()? else { return Ok(None) };
+        let Some(held) = self.nearest_pair()? else { return Ok(None) };
         let found = self.of_pair(held.pair, |querier, pair| {
             querier.signed_distance(pair.a, pair.b, &pair.pose, options)
         })?;

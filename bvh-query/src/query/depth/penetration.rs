@@ -139,7 +139,7 @@ impl Querier {
     /// continuous function of the pose: then `lower` is about 0, and `upper` how far the peg has to be pulled. All numbers have
     /// the same bits on all backends.
     ///
-    /// Cost: some microseconds for convex shapes, once 25 ms to find out that one of 4096 triangles is convex, and 50 bytes of memory for
+    /// Cost: some microseconds for convex shapes, once up to 0.2 s to find out that one of 4096 triangles is convex, and 50 bytes of memory for
     /// each of its triangles while the file is open. For others, up to a millisecond for a hundred triangles and some ten for large
     /// meshes. A budget ([`Querier::set_budget`]) ends the search early; the bounds so far are the answer.
     ///

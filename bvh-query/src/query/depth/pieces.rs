@@ -14,6 +14,7 @@ use crate::query::depth::polytope::{Corner, Polytope};
 use crate::query::depth::translation::Translation;
 use crate::query::exact::placed;
 use crate::query::querier::Querier;
+use crate::traverse::budget::Budget;
 use std::cmp::Ordering;
 
 /// The most triangles of a shape that pieces are made of.
@@ -48,7 +49,8 @@ impl Querier {
         if line.radii > 0.0 || [line.a, line.b].iter().any(|shape| shape.triangles() > MAX_TRIANGLES) {
             return Ok(0.0);
         }
-        let margin = MARGIN * line.size;
+        // Far more than what cutting rounds, and more than what placing B anew does.
+        let margin = (MARGIN * line.size).max(line.error);
         let mut pieces = [Vec::new(), Vec::new()];
         for ((shape, pose), vertices) in
             [(line.a, None), (line.b, Some(line.pose))].into_iter().zip(&mut pieces)
@@ -56,18 +58,20 @@ impl Querier {
             let triangles = self.triangles(shape, pose)?;
             *vertices = piece(triangles, centre, margin);
         }
-        Ok(depth(&pieces).map_or(0.0, |depth| (depth - 4.0 * line.error).max(0.0)))
+        let depth = depth(&pieces, &mut self.memory.budget)?;
+        Ok((depth - 4.0 * line.error).max(0.0))
     }
 
     /// Returns the triangles of a shape in A's frame.
     fn triangles(&mut self, shape: Shape<'_>, pose: Option<&Pose>) -> Result<Vec<Triangle>, QueryError> {
-        for _ in 0..shape.triangles() / 4 {
+        let mut triangles = Vec::new();
+        shape.visit_stored_until(|corners| {
+            triangles.push(pose.map_or(corners, |pose| placed(&corners, pose)));
+            triangles.len() as u64 > MAX_TRIANGLES
+        })?;
+        for _ in 0..triangles.len() / 4 {
             self.memory.budget.visit()?;
         }
-        let mut triangles = Vec::new();
-        shape.visit_triangles(|_, corners| {
-            triangles.push(pose.map_or(corners, |pose| placed(&corners, pose)))
-        })?;
         Ok(triangles)
     }
 }
@@ -91,7 +95,10 @@ fn piece(triangles: Vec<Triangle>, centre: &Point, margin: f64) -> Vec<Point> {
         .map(|triangle| (triangle_distance(&triangle, &[*centre; 3]).distance, triangle))
         .collect();
     // Of equally near ones, the order does not depend on the file.
-    let order = |x: &Triangle, y: &Triangle| x.partial_cmp(y).unwrap_or(Ordering::Equal);
+    let order = |x: &Triangle, y: &Triangle| {
+        let pairs = x.as_flattened().iter().zip(y.as_flattened());
+        pairs.map(|(x, y)| x.total_cmp(y)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    };
     by_distance.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then_with(|| order(&x.1, &y.1)));
     for (distance, triangle) in by_distance {
         if !reaches_into(&triangle, &planes, centre, 1.5 * margin) {
@@ -168,10 +175,10 @@ fn vertices(planes: &[CutPlane], centre: &Point, margin: f64) -> Vec<Point> {
     found
 }
 
-/// Returns a lower bound of the depth of the hulls of two sets of points.
-fn depth([a, b]: &[Vec<Point>; 2]) -> Option<f64> {
+/// Returns a lower bound of the depth of the hulls of two sets of points; 0 if they have hardly any volume.
+fn depth([a, b]: &[Vec<Point>; 2], budget: &mut Budget) -> Result<f64, QueryError> {
     if a.len() < 4 || b.len() < 4 {
-        return None;
+        return Ok(0.0);
     }
     let highest = |of: &[Point], direction: &Point| -> Point {
         let height = |p: &Point| dot(*p, *direction);
@@ -181,14 +188,15 @@ fn depth([a, b]: &[Vec<Point>; 2]) -> Option<f64> {
         let (of_a, of_b) = (highest(a, direction), highest(b, &direction.map(|x| -x)));
         Corner { difference: subtract(of_a, of_b), of_a, of_b }
     };
-    let mut polytope = Polytope::spanning([1.0, 0.0, 0.0], &mut farthest)?;
+    let Some(mut polytope) = Polytope::spanning([1.0, 0.0, 0.0], &mut farthest) else { return Ok(0.0) };
     loop {
+        budget.visit()?;
         let face = polytope.nearest();
         let corner = farthest(&face.normal);
         let height = dot(face.normal, corner.difference);
         let is_near = height - face.distance <= face.error.max(PRECISION * face.distance);
         if height <= 0.0 || is_near || !polytope.grow(corner) {
-            return Some(polytope.certain());
+            return Ok(polytope.certain());
         }
     }
 }

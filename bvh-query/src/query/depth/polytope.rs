@@ -113,7 +113,11 @@ impl Polytope {
 
     /// Returns a bound: the ball of this radius about 0 is inside, if it is positive.
     pub(super) fn certain(&self) -> f64 {
-        self.faces.iter().fold(f64::INFINITY, |least, face| least.min(face.distance - face.error))
+        // Nothing is known of a face without a normal.
+        let beneath = |face: &Face| {
+            if face.normal == [0.0; 3] { f64::NEG_INFINITY } else { face.distance - face.error }
+        };
+        self.faces.iter().map(beneath).fold(f64::INFINITY, f64::min)
     }
 
     /// Adds a corner. Returns whether that has changed anything.

@@ -94,6 +94,22 @@ impl Querier {
         })
     }
 
+    /// Returns the signed distance of two shapes, unless they are apart.
+    pub(crate) fn signed_unless_apart(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        options: &PenetrationOptions,
+    ) -> Result<Option<SignedDistance>, QueryError> {
+        self.start();
+        if self.relation_of(a, b, pose)? == Relation::Apart {
+            return Ok(None);
+        }
+        let distance = |querier: &mut Self| querier.distance_between(a, b, pose, &DistanceOptions::default());
+        self.signed_given(a, b, pose, options, distance).map(Some)
+    }
+
     /// Returns the signed distance, given what finds the distance.
     fn signed_given(
         &mut self,

@@ -185,6 +185,41 @@ fn what_is_not_certainly_a_convex_solid_has_its_depth_too() {
     assert!(matches!(refused, Err(QueryError::NotClosed { .. })));
 }
 
+/// A cube and the same cube inside out enclose nothing, whether the file tells of duplicates or not. A face that is divided very finely
+/// is not decided, and has its depth as well.
+#[test]
+fn what_cancels_or_is_divided_finely_is_no_convex_solid() {
+    let mut queriers = queriers();
+    let mut both = outward(cube());
+    both.extend(outward(cube()).iter().map(|[p, q, r]| [*p, *r, *q]));
+    let small = bake(&shapes::block([0.5; 3]).unwrap(), &Options::default());
+    for has_ids in [true, false] {
+        let nothing = bake(&mesh(&both), &Options::default().ids(has_ids));
+        for (b, shift) in [(&small, 0.0), (&small, 0.75), (&nothing, 0.75)] {
+            let found = penetration(&mut queriers, &nothing, b, &translation(shift, 0.0, 0.0));
+            assert_eq!(found.lower, 0.0, "{has_ids}, {shift}: {found:?}");
+        }
+    }
+    let steps = 22;
+    let grid = |x: usize, y: usize, k: usize, sign: f64| {
+        let [x, y] = [x, y].map(|at| 2.0 * at as f64 / steps as f64 - 1.0);
+        let mut point = [sign; 3];
+        (point[(k + 1) % 3], point[(k + 2) % 3]) = (x, y);
+        point
+    };
+    let mut fine = Vec::new();
+    for (k, sign) in (0..3).flat_map(|k| [(k, 1.0), (k, -1.0)]) {
+        for (x, y) in (0..steps).flat_map(|x| (0..steps).map(move |y| (x, y))) {
+            let corners = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)].map(|(x, y)| grid(x, y, k, sign));
+            fine.extend([[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]);
+        }
+    }
+    let fine = baked(&outward(fine));
+    let found = penetration(&mut queriers, &fine, &small, &translation(1.125, 0.0, 0.0));
+    assert!(found.lower > 0.0 && found.lower <= 0.125 && found.upper >= 0.125, "{found:?}");
+    assert!(found.upper < 0.125 + 1e-9, "{found:?}");
+}
+
 /// In another order, with another tree and in another encoding, a mesh is as deep to the bit.
 #[test]
 fn the_depth_does_not_depend_on_the_file() {
