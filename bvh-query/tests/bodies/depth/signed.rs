@@ -4,9 +4,7 @@ use super::moved;
 use crate::common::shapes::{cube, moved as at, outward, sphere};
 use crate::common::{Random, bake, baked, queriers, random_pose, translation};
 use bvh_bake::{Options, shapes};
-use bvh_query::{
-    Backend, Batch, Bvh, PenetrationOptions, Pose, Querier, QueryError, Relation, SignedDistance, Tracker,
-};
+use bvh_query::{Bvh, PenetrationOptions, Pose, Querier, QueryError, Relation, SignedDistance, Tracker};
 
 /// Asks on all backends, through a tracker and in a batch, which all have to agree; checks what the answer says of itself.
 #[track_caller]
@@ -70,8 +68,9 @@ fn a_block_that_passes_through_another_one() {
         }
         all.push(found);
     }
-    for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
-        let batch = Batch::with_backend(&a, &b, backend);
+    #[cfg(feature = "parallel")]
+    for querier in &queriers {
+        let batch = bvh_query::Batch::with_backend(&a, &b, querier.backend());
         assert_eq!(batch.signed_distances(&poses, &PenetrationOptions::new()).as_ref(), Ok(&all));
     }
 }
