@@ -1,7 +1,7 @@
 //! Asks two forged files every query in any pose, on every backend, and a forged scene the questions over its pairs. Answers may be wrong, but each query must end.
 #![no_main]
 
-use bvh_query::{Backend, Bvh, DistanceOptions, Pose, Querier, Ray, Scene};
+use bvh_query::{Backend, Bvh, DistanceOptions, PenetrationOptions, Pose, Querier, Ray, Scene};
 use cbvh_testkit::forge::{Input, forge};
 use libfuzzer_sys::fuzz_target;
 use std::ops::ControlFlow;
@@ -41,6 +41,9 @@ fuzz_target!(|bytes: &[u8]| {
         let _ = querier.distance_with(&a, &b, &pose, &options);
         let _ = querier.within(&a, &b, &pose, near);
         let _ = querier.relation(&a, &b, &pose);
+        querier.set_budget(1 << 16);
+        let _ = querier.signed_distance(&a, &b, &pose, &PenetrationOptions::new().tolerance(allowed));
+        querier.set_budget(u64::MAX);
         let (shape, point, away) = (a.all().at(&pose), [near, 0.0, allowed], pose.translation());
         let _ = (querier.closest_point(shape, point, f64::INFINITY), querier.side(shape, point));
         let _ = (querier.all_hits(shape, &Ray::new(point, away)), querier.segment_hit(shape, point, away));

@@ -12,7 +12,7 @@ use crate::pose::Pose;
 use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
 use crate::query::depth::convex::ConvexDepth;
 use crate::query::depth::free::{Free, LastContact};
-use crate::query::depth::planes::{HalfSpace, shortest_beyond};
+use crate::query::depth::planes::{Plane, shortest_beyond};
 use crate::query::depth::translation::{Translation, length_above, moved};
 use crate::query::options::{check, options};
 use crate::query::probe::relation::Relation;
@@ -341,7 +341,7 @@ impl<'a> DepthSearch<'a> {
 
     /// Moves B out of one contact after the other, the shortest way beyond all of them, and tries the way that this leads to.
     fn relax(&mut self, querier: &mut Querier) -> Result<(), QueryError> {
-        let mut planes: Vec<HalfSpace> = Vec::new();
+        let mut planes: Vec<Plane> = Vec::new();
         let (mut shift, mut balls) = ([0.0; 3], self.balls);
         for _ in 0..MAX_PLANES {
             let Depths { a, b, closest } = balls.depths;
@@ -351,7 +351,7 @@ impl<'a> DepthSearch<'a> {
             let out =
                 if a > b { subtract(closest[0], balls.centre) } else { subtract(balls.centre, closest[1]) };
             let Ok(normal) = unit(out) else { break };
-            planes.push(HalfSpace { normal, height: dot(normal, shift) + 1.01 * balls.lower() });
+            planes.push(Plane { normal, height: dot(normal, shift) + 1.01 * balls.lower() });
             let Some(next) = shortest_beyond(&planes) else { break };
             shift = next;
             if length(shift) >= self.best {
@@ -376,7 +376,7 @@ impl<'a> DepthSearch<'a> {
                 planes.clear();
                 least = free.at;
             }
-            planes.push(HalfSpace { normal: last.normal, height: free.at * dot(last.normal, direction) });
+            planes.push(Plane { normal: last.normal, height: free.at * dot(last.normal, direction) });
             let Some(shortest) = shortest_beyond(&planes) else { break };
             let way = length(shortest);
             let next = shortest.map(|x| x / way);

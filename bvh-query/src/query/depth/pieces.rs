@@ -8,8 +8,9 @@
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
-use crate::narrow::{Point, Triangle, cross, dot, subtract, triangle_distance, unit, unit_normal};
+use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance, unit, unit_normal};
 use crate::pose::Pose;
+use crate::query::depth::planes::{Plane, meeting};
 use crate::query::depth::polytope::{Corner, Polytope};
 use crate::query::depth::translation::Translation;
 use crate::query::exact::placed;
@@ -18,7 +19,7 @@ use crate::traverse::budget::Budget;
 use std::cmp::Ordering;
 
 /// The most triangles of a shape that pieces are made of.
-const MAX_TRIANGLES: u64 = 1024;
+const MAX_TRIANGLES: usize = 1024;
 
 /// The most planes of a piece. If more are needed, there is none.
 const MAX_PLANES: usize = 32;
@@ -29,15 +30,12 @@ const MARGIN: f64 = 1.0 / (1u64 << 34) as f64;
 /// The least sine between a plane and the way to a triangle for which the triangle's own plane is taken.
 const FACING: f64 = 0.5;
 
-/// How far apart the bounds of the depth of two pieces may be.
-const PRECISION: f64 = 1e-3;
+/// How far apart the bounds of the depth of two pieces may be, as a part of the lower one.
+const PRECISION: f64 = 1.0 / 1024.0;
 
-/// The points whose height over the centre is at most `height`, along a unit normal.
-#[derive(Clone, Copy)]
-struct CutPlane {
-    normal: Point,
-    height: f64,
-}
+/// The least volume that the normals of three planes span for their meeting point to be a vertex. Others would be off by more than 1000
+/// roundings; without them, a piece is smaller.
+const LEAST_SPANNED: f64 = 1.0 / 1024.0;
 
 impl Querier {
     /// Returns the depth of convex pieces of two shapes about a point that is certainly inside both; 0 if there are none.
@@ -46,7 +44,7 @@ impl Querier {
         line: &Translation<'_>,
         centre: &Point,
     ) -> Result<f64, QueryError> {
-        if line.radii > 0.0 || [line.a, line.b].iter().any(|shape| shape.triangles() > MAX_TRIANGLES) {
+        if line.radii > 0.0 {
             return Ok(0.0);
         }
         // Far more than what cutting rounds, and more than what placing B anew does.
@@ -55,24 +53,31 @@ impl Querier {
         for ((shape, pose), vertices) in
             [(line.a, None), (line.b, Some(line.pose))].into_iter().zip(&mut pieces)
         {
-            let triangles = self.triangles(shape, pose)?;
+            let Some(triangles) = self.triangles(shape, pose)? else { return Ok(0.0) };
             *vertices = piece(triangles, centre, margin);
         }
         let depth = depth(&pieces, &mut self.memory.budget)?;
         Ok((depth - 4.0 * line.error).max(0.0))
     }
 
-    /// Returns the triangles of a shape in A's frame.
-    fn triangles(&mut self, shape: Shape<'_>, pose: Option<&Pose>) -> Result<Vec<Triangle>, QueryError> {
+    /// Returns the triangles of a shape in A's frame; none if they are too many.
+    fn triangles(
+        &mut self,
+        shape: Shape<'_>,
+        pose: Option<&Pose>,
+    ) -> Result<Option<Vec<Triangle>>, QueryError> {
         let mut triangles = Vec::new();
-        shape.visit_stored_until(|corners| {
-            triangles.push(pose.map_or(corners, |pose| placed(&corners, pose)));
-            triangles.len() as u64 > MAX_TRIANGLES
-        })?;
+        // A damaged file may hold more than it states.
+        if shape.triangles() <= MAX_TRIANGLES as u64 {
+            shape.visit_stored_until(|corners| {
+                triangles.push(pose.map_or(corners, |pose| placed(&corners, pose)));
+                triangles.len() > MAX_TRIANGLES
+            })?;
+        }
         for _ in 0..triangles.len() / 4 {
             self.memory.budget.visit()?;
         }
-        Ok(triangles)
+        Ok((1..=MAX_TRIANGLES).contains(&triangles.len()).then_some(triangles))
     }
 }
 
@@ -87,7 +92,7 @@ fn piece(triangles: Vec<Triangle>, centre: &Point, margin: f64) -> Vec<Point> {
             let mut normal = [0.0; 3];
             normal[k] = sign;
             let heights = triangles.as_flattened().iter().map(|corner| sign * (corner[k] - centre[k]));
-            planes.push(CutPlane { normal, height: heights.fold(0.0, f64::max) });
+            planes.push(Plane { normal, height: heights.fold(0.0, f64::max) });
         }
     }
     let mut by_distance: Vec<(f64, Triangle)> = triangles
@@ -117,14 +122,14 @@ fn piece(triangles: Vec<Triangle>, centre: &Point, margin: f64) -> Vec<Point> {
         if planes.len() == MAX_PLANES || height.is_nan() || height < 2.0 * margin {
             return Vec::new();
         }
-        planes.push(CutPlane { normal, height });
+        planes.push(Plane { normal, height });
     }
     vertices(&planes, centre, margin)
 }
 
 /// Returns whether a triangle has points that are in all half-spaces, or beyond them by no more than a distance. It is cut by one
 /// plane after the other (Sutherland and Hodgman, 1974).
-fn reaches_into(triangle: &Triangle, planes: &[CutPlane], centre: &Point, beyond: f64) -> bool {
+fn reaches_into(triangle: &Triangle, planes: &[Plane], centre: &Point, beyond: f64) -> bool {
     let mut polygon = triangle.map(|corner| subtract(corner, *centre)).to_vec();
     let mut cut = Vec::new();
     for plane in planes {
@@ -150,20 +155,16 @@ fn reaches_into(triangle: &Triangle, planes: &[CutPlane], centre: &Point, beyond
 }
 
 /// Returns the points in which three planes meet well within all half-spaces.
-fn vertices(planes: &[CutPlane], centre: &Point, margin: f64) -> Vec<Point> {
+fn vertices(planes: &[Plane], centre: &Point, margin: f64) -> Vec<Point> {
     let mut found: Vec<Point> = Vec::new();
     for (i, p) in planes.iter().enumerate() {
         for (j, q) in planes[..i].iter().enumerate() {
             for r in &planes[..j] {
-                let (qr, rp, pq) =
-                    (cross(q.normal, r.normal), cross(r.normal, p.normal), cross(p.normal, q.normal));
-                let spanned = dot(p.normal, qr);
-                if spanned.abs() < 1e-3 {
+                let (spanned, at) = meeting([p, q, r]);
+                if spanned.abs() < LEAST_SPANNED {
                     continue;
                 }
-                let at =
-                    [0, 1, 2].map(|k| (p.height * qr[k] + q.height * rp[k] + r.height * pq[k]) / spanned);
-                let is_within = |plane: &CutPlane| dot(plane.normal, at) <= plane.height + margin / 2.0;
+                let is_within = |plane: &Plane| dot(plane.normal, at) <= plane.height + margin / 2.0;
                 let vertex = [0, 1, 2].map(|k| centre[k] + at[k]);
                 let is_known = |known: &Point| (0..3).all(|k| (known[k] - vertex[k]).abs() <= margin);
                 if planes.iter().all(is_within) && !found.iter().any(is_known) {

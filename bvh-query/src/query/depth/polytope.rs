@@ -25,7 +25,7 @@ pub(super) struct Corner {
 /// A face, by the numbers of its corners.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Face {
-    pub(super) corners: [u16; 3],
+    corners: [u16; 3],
     /// Away from the inside, of unit length; without area, it is zero.
     pub(super) normal: Point,
     /// How far 0 is beneath the plane, to within `error`.
@@ -36,14 +36,18 @@ pub(super) struct Face {
 /// A closed surface of faces.
 #[derive(Debug)]
 pub(super) struct Polytope {
-    pub(super) corners: Vec<Corner>,
-    pub(super) faces: Vec<Face>,
+    corners: Vec<Corner>,
+    faces: Vec<Face>,
     /// The border of what a corner sees, in use only while the polytope grows.
     border: Vec<(u16, u16)>,
 }
 
 /// The most corners. Curved shapes need about as many as the inverse of the error that is allowed.
 const MAX_CORNERS: usize = 1024;
+
+/// The least sine between the base of the first tetrahedron and the way to its apex: far more than roundings, so that its faces have
+/// known sides.
+const LEAST_SINE: f64 = 1.0 / (1 << 30) as f64;
 
 impl Polytope {
     /// Returns a tetrahedron of four corners that are the farthest along some directions, beginning with the one given; none if the
@@ -68,12 +72,12 @@ impl Polytope {
         None
     }
 
-    /// Returns the tetrahedron of four corners, or `None` if it certainly has hardly any volume.
+    /// Returns the tetrahedron of four corners, or `None` if it has hardly any volume.
     fn tetrahedron(corners: [Corner; 4]) -> Option<Self> {
         let [p, q, r, s] = corners.map(|corner| corner.difference);
         let (normal, to_s) = (cross(subtract(q, p), subtract(r, p)), subtract(s, p));
         let height = dot(normal, to_s);
-        if height.abs() <= 1e-9 * length(normal) * length(to_s) || height.is_nan() {
+        if height.is_nan() || height.abs() <= LEAST_SINE * length(normal) * length(to_s) {
             return None;
         }
         let mut polytope = Self { corners: corners.to_vec(), faces: Vec::new(), border: Vec::new() };

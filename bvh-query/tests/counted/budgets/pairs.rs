@@ -1,15 +1,15 @@
 //! Two meshes, points and lines.
 
 use super::{BUDGETS, dust, tetrahedron, text, use_this_thread, within_budget};
-use crate::common::shapes::cube;
+use crate::common::shapes::{cube, moved, outward};
 use crate::common::{Triangle, bake, baked, mesh, translation};
-use crate::forged::{blown_up, duplicated};
+use crate::forged::{blown_up, duplicated, understated};
 use bvh_bake::Options;
 use bvh_format::profile::Profile;
 use bvh_format::validate::validate;
 use bvh_query::{
-    Batch, Bvh, DistanceOptions, Motion, MotionOptions, OwnedShape, PatchOptions, Pose, ProbeBatch, Querier,
-    QueryError, Ray, Relation, RigidPath, Scene, Side, Tracker,
+    Batch, Bvh, DistanceOptions, Motion, MotionOptions, OwnedShape, PatchOptions, PenetrationOptions, Pose,
+    ProbeBatch, Querier, QueryError, Ray, Relation, RigidPath, Scene, Side, Tracker,
 };
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -276,6 +276,58 @@ fn contacts_of_duplicates_keep_to_their_budget() {
         querier.set_budget(budget);
         let asked = querier.visit_contacts(&forged, &forged, &pose, |_| ControlFlow::Break(()));
         assert_eq!(asked.is_ok(), budget >= 100, "{asked:?}, budget {budget}");
+    }
+}
+
+/// What a file states of ids, duplicates and the number of its triangles does not decide what a depth takes. Where a budget ends the
+/// search, the bounds so far hold.
+#[test]
+fn depths_keep_to_their_budget() {
+    let block = baked(&outward(cube()));
+    // Who believes the number leaves out two thirds of a cube whose faces are divided, and takes what is behind them for inside.
+    let mut parts = outward(cube());
+    for _ in 0..4 {
+        let split = |[a, b, c]: Triangle| {
+            let middle = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| (p[k] + q[k]) / 2.0);
+            let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+            [[a, d, f], [d, b, e], [f, e, c], [d, e, f]]
+        };
+        parts = parts.into_iter().flat_map(split).collect();
+    }
+    parts.extend(moved(&outward(cube()), 0.25, [4.0, 0.0, 0.0]));
+    let honest = baked(&parts);
+    let small = Bvh::from_bytes(understated(honest.bytes().to_vec(), 4)).unwrap();
+    let exact = PenetrationOptions::new().relative_gap(1e-12);
+    for axis in 0..6 {
+        let shift = [0, 1, 2].map(|k| if k == axis % 3 { 1.75 - 3.5 * (axis / 3) as f64 } else { 0.125 });
+        let pose = translation(shift[0], shift[1], shift[2]);
+        let ask = |a: &Bvh| Querier::new().unwrap().penetration(a, &block, &pose, &exact).unwrap();
+        let (found, whole) = (ask(&small), ask(&honest));
+        assert!(whole.lower > 0.0 && whole.upper < 0.251, "{whole:?}");
+        assert!(found.lower <= whole.upper && whole.lower <= found.upper, "{found:?}, {whole:?}");
+    }
+    let duplicates = Bvh::from_bytes(duplicated(200_000)).unwrap();
+    let (pose, options) = (translation(0.125, 0.5, 0.0), PenetrationOptions::new());
+    let mut free = Querier::new().unwrap();
+    for (forged, truth) in [(&small, &honest), (&duplicates, &block)] {
+        let whole = free.penetration(truth, &block, &pose, &options).unwrap();
+        assert!(whole.lower > 0.0);
+        for budget in BUDGETS {
+            let mut querier = Querier::new().unwrap();
+            querier.set_budget(budget);
+            let ask = || querier.penetration(forged, &block, &pose, &options);
+            if let Ok(found) = within_budget("penetration", budget, ask) {
+                assert!(found.lower <= whole.upper && whole.lower <= found.upper, "{found:?}, {whole:?}");
+            }
+            let mut querier = Querier::new().unwrap();
+            querier.set_budget(budget);
+            let ask = || querier.signed_distance(forged, &block, &pose, &options);
+            if let Ok(found) = within_budget("signed_distance", budget, ask) {
+                assert!(-found.upper <= whole.upper && whole.lower <= -found.lower, "{found:?}, {whole:?}");
+            }
+        }
+        let found = free.penetration(forged, &block, &pose, &options).unwrap();
+        assert!(found.lower <= whole.upper && whole.lower <= found.upper, "{found:?}, {whole:?}");
     }
 }
 
