@@ -7,7 +7,7 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
     Bvh, ClosestPoint, Contact, Distance, OpenEdges, PatchOptions, Patches, Penetration, PenetrationOptions,
-    Pose, Querier, QueryError, Ray, RayHit, Relation, SelfContact, Side,
+    Pose, Querier, QueryError, Ray, RayHit, Relation, SelfContact, Side, SignedDistance,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -26,6 +26,7 @@ pub(crate) struct Answers {
     pub(crate) within: Result<bool, QueryError>,
     pub(crate) relation: Result<Relation, QueryError>,
     pub(crate) penetration: Result<Penetration, QueryError>,
+    pub(crate) signed_distance: Result<SignedDistance, QueryError>,
     /// About a point, a ray and a segment, and B.
     pub(crate) closest: Result<Option<ClosestPoint>, QueryError>,
     pub(crate) side: Result<Side, QueryError>,
@@ -51,6 +52,7 @@ impl Answers {
             self.within.as_ref().err(),
             self.relation.as_ref().err(),
             self.penetration.as_ref().err(),
+            self.signed_distance.as_ref().err(),
             self.closest.as_ref().err(),
             self.side.as_ref().err(),
             self.hits.as_ref().err(),
@@ -79,7 +81,8 @@ impl Answers {
         patches_hold && holds(&self.collide, &other.collide) && holds(&self.contacts, &other.contacts)
             && holds(&self.self_contacts, &other.self_contacts)
             && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
-            && holds(&self.penetration, &other.penetration) && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
+            && holds(&self.penetration, &other.penetration)
+            && holds(&self.signed_distance, &other.signed_distance) && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
             && holds(&self.open_edges, &other.open_edges)
             && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
             // The limit of `within` is the distance, which may have been refused.
@@ -122,6 +125,7 @@ impl Answers {
             distance,
             relation: querier.relation(a, b, pose),
             penetration: querier.penetration(a, b, pose, &PenetrationOptions::new()),
+            signed_distance: querier.signed_distance(a, b, pose, &PenetrationOptions::new()),
             closest: querier.closest_point(at, point, f64::INFINITY),
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),

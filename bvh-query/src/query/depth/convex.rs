@@ -56,8 +56,8 @@ impl Solids<'_> {
 }
 
 impl Querier {
-    /// Returns the depth of two shapes whose cores are convex solids and certainly overlap, with bounds that are enough if possible;
-    /// none for others, or where roundings matter too much.
+    /// Returns the depth of two shapes if their cores are convex solids that certainly overlap; none if they are not, or where
+    /// roundings matter too much. The search ends as soon as both bounds are enough.
     ///
     /// The surface of the placed B is within what placing it rounds of a convex one. Scaled about a centre so that it keeps as far
     /// inside of that as the surface may come, B is certainly convex; that takes the same part of its reach as of the ball inside.

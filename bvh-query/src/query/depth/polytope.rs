@@ -5,7 +5,7 @@
 //! surface; each one that is added replaces the faces that it sees by those between itself and their border. This is the expanding
 //! polytope algorithm (van den Bergen, *Proximity Queries and Penetration Depth Computation on 3D Game Objects*, 2001).
 //!
-//! That the result is a proof does not depend on how it was made. Each directed edge of a face has its opposite in another one, now
+//! The proof does not depend on how the polytope was made. Each directed edge of a face has its opposite in another one, now
 //! and after each step, so the faces are a closed surface. If 0 is certainly beneath the plane of each, by at least `r`, all faces
 //! turn the same way around it, so that the surface winds around 0 at least once and meets no point nearer than `r`. It winds around
 //! none outside of the difference, which is convex and contains all faces. So the ball of radius `r` about 0 is in the difference.

@@ -70,7 +70,7 @@ impl Querier {
     /// false then. All
     /// numbers have the same bits on all backends.
     ///
-    /// As B moves, the number changes by no more than a translation does, but points and normals may jump: where several are equally
+    /// A translation of B changes the signed distance by at most its length. Points and normals may jump: where several are equally
     /// near, one of them is the answer.
     ///
     /// Cost: that of `distance`, and of a few sides of points; where the shapes overlap, that of `penetration`.
