@@ -17,6 +17,7 @@
 //! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
 //! | is the line between two points free? | [`Querier::segment_hit`] | `bool`, exact |
 //! | how far apart are they or, below zero, how deep do they overlap? | [`Querier::signed_distance`] | certified bounds, points, the way out |
+//! | how much do they have in common? | [`Querier::intersection`] | volume with a certified error, areas, box, thickness of what is pierced |
 //! | how deep do they overlap? | [`Querier::penetration`], [`Querier::separation`] | certified bounds, and a translation that ends it |
 //! | are they near, touching, overlapping? | [`Querier::clash`], [`Scene::clashes`] | class, distance, depth |
 //! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
@@ -108,6 +109,7 @@ pub use query::depth::penetration::{Penetration, PenetrationOptions, Separation}
 pub use query::depth::signed_distance::SignedDistance;
 pub use query::displacement::displacement;
 pub use query::distance::Distance;
+pub use query::intersection::{Intersection, IntersectionSurface};
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;
 pub use query::patches::{Patch, PatchOptions, Patches};

@@ -42,6 +42,8 @@ fuzz_target!(|bytes: &[u8]| {
         let _ = querier.within(&a, &b, &pose, near);
         let _ = querier.relation(&a, &b, &pose);
         querier.set_budget(1 << 16);
+        let _ = querier.intersection(&a, &b, &pose);
+        let _ = querier.intersection_surface(&a, &b, &pose);
         let _ = querier.signed_distance(&a, &b, &pose, &PenetrationOptions::new().tolerance(allowed));
         querier.set_budget(u64::MAX);
         let (shape, point, away) = (a.all().at(&pose), [near, 0.0, allowed], pose.translation());

@@ -9,7 +9,7 @@ pub(crate) struct LeafPacket {
 }
 
 /// Where a triangle is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct TrianglePlace {
     pub(crate) page: u32,
     pub(crate) packet: u16,

@@ -42,9 +42,9 @@ pub(crate) struct Region {
 
 /// A constructed point, and how far it is at most from the exact one.
 #[derive(Clone, Copy)]
-struct Constructed {
-    point: Point,
-    error: f64,
+pub(super) struct Constructed {
+    pub(super) point: Point,
+    pub(super) error: f64,
 }
 
 impl Constructed {
@@ -128,7 +128,7 @@ fn meeting_of_edges(edge_a: [Point; 2], edge_b: [Point; 2], a: &Triangle, b: &Tr
 }
 
 /// Returns the point in which an edge meets a plane that does not contain it and that its ends are not strictly on one side of.
-fn meeting_of_plane(edge: [Point; 2], plane: &Triangle) -> Constructed {
+pub(super) fn meeting_of_plane(edge: [Point; 2], plane: &Triangle) -> Constructed {
     let [p, q] = sorted(edge);
     let sides = heights(plane, &[p, q]);
     if sides[0] == 0.0 {

@@ -326,7 +326,7 @@ fn has_separating_edge(a: &[Point], b: &[Point], axis: usize) -> bool {
 }
 
 /// Returns an axis along which the triangle projects to one with area; the triangle must have area itself.
-pub(super) fn area_axis(triangle: &Triangle) -> usize {
+pub(crate) fn area_axis(triangle: &Triangle) -> usize {
     (0..2).find(|axis| area(*axis, triangle[0], triangle[1], triangle[2]) != 0.0).unwrap_or(2)
 }
 

@@ -10,6 +10,7 @@
 //! Seen along the axis, the problem is two-dimensional: signs are those of `orient2d` and, for the triangles that the
 //! ray's line meets, of one `orient3d`. Both are exact under the precondition of [`narrow`](super).
 
+use super::edge_crossing::moved_height;
 use super::intersection::{area, triangles_intersect, volume};
 use super::{Point, Triangle};
 
@@ -46,6 +47,19 @@ impl AxisRay {
     /// Decides how the ray passes a triangle.
     #[inline(always)]
     pub(crate) fn passing(&self, triangle: &Triangle) -> Passing {
+        self.passing_if(triangle, None)
+    }
+
+    /// Decides how the ray passes a triangle if its origin, too, is moved: by (ε³, ε, ε²), or the other way for a sign of -1. The ray has
+    /// to be along the first axis, so that this moves it as it is moved anyway.
+    pub(crate) fn passing_beside(&self, triangle: &Triangle, sign: f64) -> Passing {
+        self.passing_if(triangle, Some(sign))
+    }
+
+    /// Decides how the ray passes a triangle, and whether its origin is on it, unless that is moved as well.
+    #[inline(always)]
+    fn passing_if(&self, triangle: &Triangle, moved: Option<f64>) -> Passing {
+        let sign = moved.unwrap_or(1.0);
         let [a, b, c] = *triangle;
         let edges = [(a, b), (b, c), (c, a)];
         let sides = edges.map(|(p, q)| area(self.axis, p, q, self.origin));
@@ -56,17 +70,18 @@ impl AxisRay {
         }
         if !positive && !negative {
             // Seen along the axis, the triangle has no area: the moved ray does not meet it.
-            let starts = triangles_intersect(triangle, &[self.origin; 3]);
+            let starts = moved.is_none() && triangles_intersect(triangle, &[self.origin; 3]);
             return if starts { Passing::Starts } else { Passing::Misses };
         }
-        let height = volume(a, b, c, self.origin);
+        let mut height = volume(a, b, c, self.origin);
         if height == 0.0 {
-            return Passing::Starts;
+            let Some(beside) = moved.and_then(|_| moved_height(triangle)) else { return Passing::Starts };
+            height = sign * beside;
         }
         let forwards = positive == self.ascends;
         let is_ahead = forwards == (height < 0.0);
         let meets = (0..3).all(|i| {
-            let side = if sides[i] == 0.0 { self.side_of_moved(edges[i]) } else { sides[i] };
+            let side = if sides[i] == 0.0 { sign * self.side_of_moved(edges[i]) } else { sides[i] };
             (side > 0.0) == positive
         });
         match (is_ahead && meets, forwards) {

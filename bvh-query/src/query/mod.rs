@@ -11,6 +11,7 @@ pub(crate) mod depth;
 pub(crate) mod displacement;
 pub(crate) mod distance;
 mod exact;
+pub(crate) mod intersection;
 pub(crate) mod motion;
 pub(crate) mod options;
 mod pair_search;

@@ -5,6 +5,7 @@
 mod common;
 
 mod depth;
+mod intersection;
 mod patches;
 mod probes;
 mod rounded;

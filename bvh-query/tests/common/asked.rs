@@ -6,8 +6,9 @@ use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{
-    Bvh, ClosestPoint, Contact, Distance, OpenEdges, PatchOptions, Patches, Penetration, PenetrationOptions,
-    Pose, Querier, QueryError, Ray, RayHit, Relation, SelfContact, Side, SignedDistance,
+    Bvh, ClosestPoint, Contact, Distance, Intersection, IntersectionSurface, OpenEdges, PatchOptions,
+    Patches, Penetration, PenetrationOptions, Pose, Querier, QueryError, Ray, RayHit, Relation, SelfContact,
+    Side, SignedDistance,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -27,6 +28,8 @@ pub(crate) struct Answers {
     pub(crate) relation: Result<Relation, QueryError>,
     pub(crate) penetration: Result<Penetration, QueryError>,
     pub(crate) signed_distance: Result<SignedDistance, QueryError>,
+    pub(crate) intersection: Result<Intersection, QueryError>,
+    pub(crate) intersection_surface: Result<IntersectionSurface, QueryError>,
     /// About a point, a ray and a segment, and B.
     pub(crate) closest: Result<Option<ClosestPoint>, QueryError>,
     pub(crate) side: Result<Side, QueryError>,
@@ -53,6 +56,8 @@ impl Answers {
             self.relation.as_ref().err(),
             self.penetration.as_ref().err(),
             self.signed_distance.as_ref().err(),
+            self.intersection.as_ref().err(),
+            self.intersection_surface.as_ref().err(),
             self.closest.as_ref().err(),
             self.side.as_ref().err(),
             self.hits.as_ref().err(),
@@ -82,7 +87,8 @@ impl Answers {
             && holds(&self.self_contacts, &other.self_contacts)
             && holds(&self.distance, &other.distance) && holds(&self.relation, &other.relation)
             && holds(&self.penetration, &other.penetration)
-            && holds(&self.signed_distance, &other.signed_distance) && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
+            && holds(&self.signed_distance, &other.signed_distance) && holds(&self.intersection, &other.intersection)
+            && holds(&self.intersection_surface, &other.intersection_surface) && holds(&self.closest, &other.closest) && holds(&self.side, &other.side)
             && holds(&self.open_edges, &other.open_edges)
             && holds(&self.hits, &other.hits) && holds(&self.segment, &other.segment)
             // The limit of `within` is the distance, which may have been refused.
@@ -126,6 +132,8 @@ impl Answers {
             relation: querier.relation(a, b, pose),
             penetration: querier.penetration(a, b, pose, &PenetrationOptions::new()),
             signed_distance: querier.signed_distance(a, b, pose, &PenetrationOptions::new()),
+            intersection: querier.intersection(a, b, pose),
+            intersection_surface: querier.intersection_surface(a, b, pose),
             closest: querier.closest_point(at, point, f64::INFINITY),
             side: querier.side(at, point),
             hits: querier.all_hits(at, &Ray::new(point, [0.3, 0.2, -0.9])),

@@ -282,7 +282,7 @@ fn common_box(a: &PlacedShape<'_>, b: &PlacedShape<'_>) -> Option<(Point, Point)
 }
 
 /// Returns a box around a shape.
-pub(super) fn bounds(placed: &PlacedShape<'_>) -> [Point; 2] {
+pub(in crate::query) fn bounds(placed: &PlacedShape<'_>) -> [Point; 2] {
     let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for object in placed.shape.objects() {
         let [low, high] = object.bounding_box();

@@ -1,6 +1,6 @@
 //! How deep shapes overlap: the ways on which they come free, and how far they have to go at least.
 
-mod balls;
+pub(super) mod balls;
 pub(crate) mod clash;
 mod convex;
 mod free;

@@ -3,7 +3,7 @@
 pub(in crate::query) mod bounded;
 pub(crate) mod closest;
 pub(crate) mod line;
-mod near;
+pub(in crate::query) mod near;
 pub(crate) mod placed;
 pub(crate) mod point;
 #[cfg(feature = "parallel")]

@@ -13,7 +13,7 @@ use bvh_format::treelet::Child;
 use std::collections::BTreeSet;
 
 /// Returns the triangles of the leaf packets whose slabs meet a box around the object's origin.
-pub(super) fn near(
+pub(in crate::query) fn near(
     bvh: &Bvh,
     object: &Object,
     [lo, hi]: &[[f64; 3]; 2],

@@ -101,7 +101,7 @@ impl IntoObject {
     }
 
     /// Returns a box around the object's origin that contains another shape.
-    pub(super) fn bounds_of(&self, other: &PlacedShape<'_>) -> [[f64; 3]; 2] {
+    pub(in crate::query) fn bounds_of(&self, other: &PlacedShape<'_>) -> [[f64; 3]; 2] {
         let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for object in other.shape.objects() {
             let [low, high] = object.bounding_box();

@@ -174,7 +174,7 @@ impl Querier {
             let topology = placed.shape.bvh().topology(placed.shape.first() + index)?;
             undefined |= !topology.closed && open == OpenObject::Undefined;
             let Some(ray) = short_way_out(point, &into) else { continue };
-            let mut question = Winding { ray, topology, is_on: false, winding: 0 };
+            let mut question = Winding { ray, beside: None, topology, is_on: false, winding: 0 };
             self.ask_line_of_object(placed, index, &into, &mut question)?;
             if question.is_on {
                 return Ok(Side::On);
@@ -186,6 +186,32 @@ impl Querier {
             (false, 0) => Side::Outside,
             (false, _) => Side::Inside,
         })
+    }
+}
+
+impl Querier {
+    /// Returns how often a shape winds around a point that has been checked, and is moved by less than any number: by (ε³, ε, ε²) with a
+    /// sign. So no point is on its surface. All its objects are closed.
+    pub(crate) fn winding_beside(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        point: &Point,
+        sign: f64,
+    ) -> Result<i64, QueryError> {
+        let mut winding = 0;
+        for (index, object) in placed.shape.objects().iter().enumerate() {
+            self.memory.budget.visit()?;
+            let into = IntoObject::new(placed.pose.as_ref(), object);
+            if short_way_out(point, &into).is_none() {
+                continue;
+            }
+            let topology = placed.shape.bvh().topology(placed.shape.first() + index)?;
+            let ray = AxisRay { origin: *point, axis: 0, ascends: true };
+            let mut question = Winding { ray, beside: Some(sign), topology, is_on: false, winding: 0 };
+            self.ask_line_of_object(placed, index, &into, &mut question)?;
+            winding += question.winding;
+        }
+        Ok(winding)
     }
 }
 
@@ -213,6 +239,8 @@ fn short_way_out(point: &Point, into: &IntoObject) -> Option<AxisRay> {
 /// How often does an object wind around a point?
 struct Winding<'a> {
     ray: AxisRay,
+    /// The sign with which the point is moved, if it is.
+    beside: Option<f64>,
     topology: Topology<'a>,
     is_on: bool,
     winding: i64,
@@ -238,7 +266,10 @@ impl LineQuestion for Winding<'_> {
     }
 
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
-        let passing = self.ray.passing(&candidate.triangle);
+        let passing = match self.beside {
+            None => self.ray.passing(&candidate.triangle),
+            Some(sign) => self.ray.passing_beside(&candidate.triangle, sign),
+        };
         if passing == Passing::Starts {
             self.is_on = true;
         } else if passing != Passing::Misses && self.topology.closed {

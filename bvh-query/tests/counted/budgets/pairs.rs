@@ -1,7 +1,7 @@
 //! Two meshes, points and lines.
 
 use super::{BUDGETS, dust, tetrahedron, text, use_this_thread, within_budget};
-use crate::common::shapes::{cube, moved, outward};
+use crate::common::shapes::{cube, moved, outward, sphere};
 use crate::common::{Triangle, bake, baked, mesh, translation};
 use crate::forged::{blown_up, duplicated, understated};
 use bvh_bake::Options;
@@ -328,6 +328,34 @@ fn depths_keep_to_their_budget() {
         }
         let found = free.penetration(forged, &block, &pose, &options).unwrap();
         assert!(found.lower <= whole.upper && whole.lower <= found.upper, "{found:?}, {whole:?}");
+    }
+}
+
+/// What two closed meshes have in common, which takes memory for each triangle in the box of the other mesh and for each contact.
+#[test]
+fn intersections_keep_to_their_budget() {
+    let ball = baked(&outward(sphere(4)));
+    let mut querier = Querier::new().unwrap();
+    for x in [0.0, 0.5, 1.9] {
+        let pose = translation(x, 0.25, 0.125);
+        querier.set_budget(u64::MAX);
+        let whole = querier.intersection(&ball, &ball, &pose).unwrap();
+        let surface = querier.intersection_surface(&ball, &ball, &pose).unwrap();
+        let mut answered = 0;
+        for budget in BUDGETS.into_iter().chain([1000, 100_000, 1_000_000]) {
+            querier.set_budget(budget);
+            if let Ok(found) =
+                within_budget("intersection", budget, || querier.intersection(&ball, &ball, &pose))
+            {
+                assert_eq!(found, whole);
+                answered += 1;
+            }
+            let ask = || querier.intersection_surface(&ball, &ball, &pose);
+            if let Ok(found) = within_budget("intersection_surface", budget, ask) {
+                assert_eq!(found, surface);
+            }
+        }
+        assert!((1..7).contains(&answered), "{answered}");
     }
 }
 
