@@ -50,7 +50,8 @@ pub struct SceneDistance {
     pub nearest: Distance,
 }
 
-/// A pair of instances that clash, and how. Points and translations are in A's frame.
+/// A pair of instances that clash, and how. Points and translations are in A's frame, and the box of what they have in common is in that
+/// of the world.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneClash {
@@ -87,6 +88,8 @@ pub(super) struct InstancePair<'a> {
     pub(super) b: Shape<'a>,
     /// B in A's frame.
     pub(super) pose: Pose,
+    /// A in the world.
+    world: Pose,
     /// What is remembered of the pair, if the scene wants that.
     tracker: Option<MutexGuard<'a, Tracker>>,
 }
@@ -193,7 +196,13 @@ impl Scene {
         self.each_piece(reach, &mut |scene, mut near_pairs| {
             near_pairs.retain(|near_pair| is_asked(scene.ids(near_pair.a, near_pair.b)));
             all.extend(scene.each(&near_pairs, |querier, pair| {
-                let clash = querier.clash(pair.a, pair.b, &pair.pose, options)?;
+                let (world, at) = (pair.world.rotation(), pair.world.translation());
+                let mut clash = querier.clash_along(pair.a, pair.b, &pair.pose, options, *world)?;
+                for corner in
+                    clash.magnitudes.iter_mut().filter_map(|shared| shared.bounds.as_mut()).flatten()
+                {
+                    *corner = [0, 1, 2].map(|k| corner[k] + at[k]);
+                }
                 Ok((clash.class != ClashClass::Apart).then_some(SceneClash { pair: pair.ids, clash }))
             })?);
             Ok(ControlFlow::Continue(()))
@@ -527,7 +536,7 @@ impl Scene {
         let (tracker, margin) = (self.trackers.get((a, b)), one.margin + self.contents.margin_of_pair(a, b));
         let a = one.shape.in_file(&file_a).with_margin(margin);
         let b = other.shape.in_file(&file_b).with_margin(other.margin);
-        let pair = &mut InstancePair { ids, a, b, pose, tracker };
+        let pair = &mut InstancePair { ids, a, b, pose, world: one.world, tracker };
         let answer = self.workers.ask_rest(querier, |querier| ask(querier, pair));
         asked.fetch_add(querier.questions() - before, Ordering::Relaxed);
         answer

@@ -83,7 +83,12 @@ impl Old {
             (Some(old), Some(new)) => (old - new).abs() <= tolerance,
             (old, new) => old.is_none() && new.is_none(),
         };
-        self.class == clash.class.name() && pairs.into_iter().all(agree)
+        // A run without magnitudes does not divide overlapping parts.
+        let is_same_class = ClashClass::ALL
+            .into_iter()
+            .any(|class| class.name() == self.class && clash.is_of(class))
+            || clash.class == ClashClass::Overlapping && ["piercing", "protruding"].contains(&&*self.class);
+        is_same_class && pairs.into_iter().all(agree)
     }
 
     /// Returns the clash as it was.

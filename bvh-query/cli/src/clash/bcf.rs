@@ -53,9 +53,9 @@ fn markup(assembly: &Assembly, clash: &Found<'_>, index: usize, date: &str) -> S
     let extent = clash.extent();
     let titled = if extent.is_empty() { String::new() } else { format!(", {extent}") };
     let priority = match clash.class {
-        ClashClass::Overlapping | ClashClass::Undecided | ClashClass::Intersecting => "High",
         ClashClass::Duplicated | ClashClass::Contained => "Medium",
-        _ => "Low",
+        ClashClass::Near | ClashClass::Touching | ClashClass::Apart => "Low",
+        _ => "High",
     };
     let unit = if assembly.is_in_metres { "metres" } else { "mesh units" };
     let (topic, view, place) = (guid(clash, "topic"), guid(clash, "viewpoint"), clash.place());

@@ -3,7 +3,7 @@
 use super::parts::{Assembly, centre};
 use crate::console::{Record, hex, record, shown};
 use bvh_format::checksum::checksum;
-use bvh_query::{ClashClass, Relation, SceneClash};
+use bvh_query::{ClashClass, Intersection, Pose, Querier, QueryError, Relation, SceneClash};
 use std::cmp::Ordering;
 
 /// A clash of two parts, in the frame of the world.
@@ -20,6 +20,10 @@ pub(super) struct Found<'a> {
     pub(super) depth: Option<[f64; 2]>,
     /// What moves the second part out of the first one.
     pub(super) translation: Option<[f64; 3]>,
+    /// What both have in common, where that is asked for and known.
+    pub(super) shared: Option<Intersection>,
+    /// Which parts are not closed, if that is why magnitudes that were asked for are not known.
+    open: Option<[bool; 2]>,
     pub(super) point: [f64; 3],
     /// How the clash compares with that of the baseline.
     pub(super) status: Option<Status>,
@@ -42,7 +46,9 @@ impl Status {
 }
 
 /// The classes of clashes, those that matter most first.
-pub(super) const BY_WEIGHT: [ClashClass; 7] = [
+pub(super) const BY_WEIGHT: [ClashClass; 9] = [
+    ClashClass::Piercing,
+    ClashClass::Protruding,
     ClashClass::Overlapping,
     ClashClass::Undecided,
     ClashClass::Intersecting,
@@ -70,6 +76,8 @@ impl<'a> Found<'a> {
             distance: has_distance.then_some(clash.distance),
             depth: clash.depth.map(|depth| [depth.lower, depth.upper]),
             translation: clash.depth.filter(|_| clash.distance == 0.0).map(|depth| turn(depth.translation)),
+            shared: clash.magnitudes,
+            open: None,
             point: world.place(clash.point),
             status: None,
         }
@@ -85,6 +93,8 @@ impl<'a> Found<'a> {
             distance: Some(0.0),
             depth: None,
             translation: None,
+            shared: None,
+            open: None,
             point: centre(&assembly.parts[parts[0]].bounds()),
             status: None,
         }
@@ -109,19 +119,78 @@ impl<'a> Found<'a> {
             .then_with(|| self.parts.cmp(&other.parts))
     }
 
+    /// Orders clashes by the volume that parts have in common, the largest first, and else as [`Found::order`] does.
+    pub(super) fn order_by_volume(&self, other: &Self) -> Ordering {
+        let volume = |of: &Self| of.shared.map_or(0.0, |shared| shared.volume);
+        volume(other).total_cmp(&volume(self)).then_with(|| self.order(other))
+    }
+
+    /// Returns whether the parts may have this volume in common.
+    pub(super) fn may_share(&self, volume: f64) -> bool {
+        match self.shared {
+            Some(shared) => shared.volume + shared.volume_error >= volume,
+            None => self.class == ClashClass::Intersecting,
+        }
+    }
+
+    /// Adds the magnitudes of a part and its copy, and the reason where there are none.
+    pub(super) fn complete(&mut self, assembly: &Assembly, querier: &mut Querier) -> Result<(), QueryError> {
+        if self.shared.is_some() || matches!(self.class, ClashClass::Near | ClashClass::Touching) {
+            return Ok(());
+        }
+        let [first, second] = self.parts.map(|number| &assembly.parts[number]);
+        let (a, b) = (first.shape.opened()?, second.shape.opened()?);
+        let open = [!a.shape().is_closed()?, !b.shape().is_closed()?];
+        if open != [false; 2] {
+            self.open = Some(open);
+        } else if self.class == ClashClass::Duplicated {
+            // Copies are in one place.
+            let mut shared = querier.intersection(a.shape(), b.shape(), &Pose::IDENTITY)?;
+            shared.bounds = Some(first.bounds());
+            self.shared = Some(shared);
+        }
+        Ok(())
+    }
+
+    /// Returns why magnitudes are not known, in words.
+    fn reason(&self) -> Option<&'static str> {
+        match self.open? {
+            [true, true] => Some("both are not closed"),
+            [true, false] => Some("a is not closed"),
+            _ => Some("b is not closed"),
+        }
+    }
+
+    /// Returns whether a class that was named is that of the clash: overlapping stands for piercing and protruding, too.
+    pub(super) fn is_of(&self, class: ClashClass) -> bool {
+        let divided = matches!(self.class, ClashClass::Piercing | ClashClass::Protruding);
+        self.class == class || class == ClashClass::Overlapping && divided
+    }
+
     /// Returns whether `--fail-on` is about this clash if it is about its class.
     pub(super) fn is_fresh(&self) -> bool {
         self.status != Some(Status::Same)
     }
 
     pub(super) fn json(&self) -> Record {
+        let shared = self.shared;
         self.named()
             .with(record! { translation: self.translation, point: self.point })
+            .with((shared.is_some() || self.open.is_some()).then(|| {
+                record! {
+                    volume: shared.map(|shared| shared.volume),
+                    volume_error: shared.map(|shared| shared.volume_error),
+                    area: shared.map(|shared| [shared.area_a, shared.area_b]),
+                    pierced: shared.map(|shared| [shared.pierced_a, shared.pierced_b]),
+                    box: shared.map(|shared| shared.bounds),
+                    reason: self.reason(),
+                }
+            }))
             .with(self.status.map(|status| record! { status: status.name() }))
     }
 
     /// The fields of a row, in order.
-    pub(super) const COLUMNS: [&'static str; 15] = [
+    pub(super) const COLUMNS: [&'static str; 27] = [
         "id",
         "class",
         "a",
@@ -136,6 +205,18 @@ impl<'a> Found<'a> {
         "x",
         "y",
         "z",
+        "volume",
+        "volume_error",
+        "area_a",
+        "area_b",
+        "pierced_a",
+        "pierced_b",
+        "low_x",
+        "low_y",
+        "low_z",
+        "high_x",
+        "high_y",
+        "high_z",
         "status",
     ];
 
@@ -143,9 +224,21 @@ impl<'a> Found<'a> {
     pub(super) fn row(&self) -> Record {
         let moved = self.translation.map(|v| v.map(Some)).unwrap_or_default();
         let [x, y, z] = self.point;
+        let shared = self.shared.as_ref();
+        let corner = |which: usize| {
+            let corners = shared.and_then(|shared| shared.bounds);
+            corners.map(|corners| corners[which].map(Some)).unwrap_or_default()
+        };
+        let (low, high) = (corner(0), corner(1));
         self.named().with(record! {
             translation_x: moved[0], translation_y: moved[1], translation_z: moved[2],
-            x: x, y: y, z: z, status: self.status.map(Status::name),
+            x: x, y: y, z: z,
+            volume: shared.map(|shared| shared.volume), volume_error: shared.map(|shared| shared.volume_error),
+            area_a: shared.map(|shared| shared.area_a), area_b: shared.map(|shared| shared.area_b),
+            pierced_a: shared.and_then(|shared| shared.pierced_a),
+            pierced_b: shared.and_then(|shared| shared.pierced_b),
+            low_x: low[0], low_y: low[1], low_z: low[2], high_x: high[0], high_y: high[1], high_z: high[2],
+            status: self.status.map(Status::name),
         })
     }
 
@@ -159,6 +252,21 @@ impl<'a> Found<'a> {
 
     /// Returns how much the parts clash, in words.
     pub(super) fn extent(&self) -> String {
+        let mut words = vec![self.lengths()];
+        if let Some(Intersection { volume, pierced_a, pierced_b, .. }) = self.shared {
+            words.push(format!("volume {}", short(volume)));
+            let pierced = [("first", pierced_a), ("second", pierced_b)].into_iter();
+            words.extend(pierced.filter_map(|(which, thickness)| {
+                Some(format!("{} of the {which} pierced", short(thickness?)))
+            }));
+        }
+        words.extend(self.reason().map(str::to_owned));
+        words.retain(|words| !words.is_empty());
+        words.join(", ")
+    }
+
+    /// Returns how far apart or how deep in each other the parts are, in words.
+    fn lengths(&self) -> String {
         match (self.class, self.depth, self.distance) {
             (ClashClass::Contained, ..) if self.relation == Relation::AInB => {
                 "the first in the second".to_owned()

@@ -14,7 +14,7 @@ use crate::process;
 use crate::view::output::{self, PageArguments, refuse_input, refuse_standard_output};
 use baseline::{Baseline, Old};
 use bvh_bake::Rounding;
-use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, QueryError, SceneError};
+use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, Querier, QueryError, SceneError};
 use clap::Args;
 use found::{BY_WEIGHT, Found, Status, both, short};
 use parts::{Assembly, Part};
@@ -28,6 +28,7 @@ Examples:
   cbvh clash base.stl arm.stl cover.cbvh --json > clashes.json
   cbvh clash factory.glb --baseline clashes.json --fail-on overlapping,intersecting
   cbvh clash factory.cbvh --bcf clashes.bcfzip --view clashes.html
+  cbvh clash building.glb --sort volume --min-volume 1e-4 --csv clashes.csv
   cbvh clash --manifest parts.jsonl --shard 3/16 --json > clashes.3.json
 
 The parts are the instances of a scene (.glb, .gltf and .dae files, and what cbvh bake --scene made), the objects of a .cbvh file, \
@@ -45,6 +46,16 @@ Each pair that is not apart is a clash of one class:
   near          they are at most the clearance apart, but farther than the tolerance
   touching      they are no farther apart and no deeper in each other than the tolerance
 
+--magnitudes also measures what parts have in common, and divides overlapping ones:
+
+  piercing      one enters the other and leaves it on another side, like a duct through a wall
+  protruding    they overlap, and neither passes through the other
+
+It tells the volume, with a certified bound of its error, the area of each surface in it, its box in the world, and how thick a part is \
+where another one pierces it: the least distance between where that one enters and leaves. Parts that are not closed have no magnitudes; \
+near and touching ones share nothing. --fail-on overlapping is about piercing and protruding ones, too. --sort volume lists the \
+largest volumes first, and --min-volume leaves out what shares less, but for intersecting parts, whose volume is unknown.
+
 The list has them in this order, deep ones and near ones first. The depth is the length of the shortest move of the second part \
 after which they do not overlap; it is certainly between the two bounds. --visits limits the search for it, for each pair. \
 Lengths are in mesh units, which are metres for glTF and COLLADA files.
@@ -60,7 +71,8 @@ not asked about other parts, because they clash with the earlier one in the same
 --json prints one object: inputs, units, clearance, tolerance, parts, copies (those that are not asked about others), triangles, \
 seconds, classes (the number of clashes of each), and clashes. A clash has id, class, a, b, relation (as cbvh query numbers it), \
 distance, lower and upper (the bounds of the depth, 0 for parts that touch across a gap), translation (what moves b out of a) and point, both in the world. What \
-there is not is null. --csv writes the same rows; a name that a spreadsheet could take for a formula, or that begins with an \
+there is not is null. With --magnitudes, a clash that has them also has volume, volume_error, area (of a's surface and of b's), \
+pierced (the thickness of a and of b), box (its corners), and reason (why there are none). --csv writes the same rows; a name that a spreadsheet could take for a formula, or that begins with an \
 apostrophe, has an apostrophe before it. The id is a hash of both names, and stays the same while they do.
 
 --baseline compares with an earlier --json. Each clash gets a status: new, changed (another class, or a distance or a bound that \
@@ -104,6 +116,15 @@ pub(crate) struct ClashArguments {
     /// Coordinates of meshes: none, or f32, which rounds each to the nearest f32 number on purpose, so that equal ones stay equal
     #[arg(long, value_name = "R", default_value = "none", value_parser = rounding)]
     round: Rounding,
+    /// Also measure what parts have in common: volume, areas, box, and how thick a part is where another one pierces it
+    #[arg(long)]
+    magnitudes: bool,
+    /// The order of the list: class, or volume, which also measures
+    #[arg(long, value_name = "ORDER", default_value = "class", value_parser = ["class", "volume"])]
+    sort: String,
+    /// Leave out clashes of parts that have less than this volume in common, in cubic mesh units; measures as well
+    #[arg(long, value_name = "V", value_parser = not_negative, allow_negative_numbers = true)]
+    min_volume: Option<f64>,
     /// Make each object of a mesh file a part
     #[arg(long)]
     split_objects: bool,
@@ -189,6 +210,8 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
     let tolerance = arguments.tolerance.unwrap_or_else(|| 1e-6 * assembly.diagonal());
     let options =
         ClashOptions::new().clearance(arguments.clearance).tolerance(tolerance).visits(arguments.visits);
+    let by_volume = arguments.sort == "volume";
+    let options = options.magnitudes(arguments.magnitudes || by_volume || arguments.min_volume.is_some());
     spinner.set_message(format!("asking about {} parts", assembly.parts.len()));
     let (mut scene, numbers) = assembly.scene(backend)?;
     scene.set_parallel(is_parallel);
@@ -203,7 +226,15 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
         .collect();
     let copies = assembly.parts.iter().enumerate().filter_map(|(number, part)| Some([part.same_as?, number]));
     found.extend(copies.filter(|&[first, _]| is_asked(first)).map(|pair| Found::of_copy(&assembly, pair)));
-    found.sort_by(Found::order);
+    if options.magnitudes {
+        let mut querier = Querier::with_backend(backend);
+        found
+            .iter_mut()
+            .try_for_each(|clash| clash.complete(&assembly, &mut querier))
+            .map_err(|error| of_file(&error))?;
+    }
+    found.retain(|clash| arguments.min_volume.is_none_or(|volume| clash.may_share(volume)));
+    found.sort_by(if by_volume { Found::order_by_volume } else { Found::order });
     let gone = baseline.map(|baseline| baseline.compare(&mut found, tolerance));
     spinner.finish_and_clear();
     let answer = Answer {
@@ -397,7 +428,7 @@ impl Answer<'_> {
     /// Returns the failure that `--fail-on` asks for.
     fn failure(&self) -> Option<Failure> {
         let classes = &self.arguments.fail_on;
-        let is_bad = |clash: &&Found<'_>| clash.is_fresh() && classes.contains(&clash.class);
+        let is_bad = |clash: &&Found<'_>| clash.is_fresh() && classes.iter().any(|class| clash.is_of(*class));
         let mut bad = self.found.iter().filter(is_bad);
         let first = bad.next()?;
         let classes = classes.iter().map(|class| class.name()).collect::<Vec<_>>().join(",");

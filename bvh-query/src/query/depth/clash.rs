@@ -8,6 +8,7 @@ use crate::query::depth::penetration::{Penetration, PenetrationOptions};
 use crate::query::displacement::{displacement, size};
 use crate::query::distance::Distance;
 use crate::query::exact::{placed, stored_at};
+use crate::query::intersection::{AXES, Intersection};
 use crate::query::options::{check, options};
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
@@ -37,11 +38,16 @@ pub enum ClashClass {
     Undecided = 6,
     /// They have points in common, and one is not closed, so that they have no depth.
     Intersecting = 7,
+    /// Their depth exceeds the tolerance, and one passes through the other. Overlapping parts are this or protruding if magnitudes are
+    /// asked for ([`ClashOptions::magnitudes`]).
+    Piercing = 8,
+    /// Their depth exceeds the tolerance, and neither passes through the other.
+    Protruding = 9,
 }
 
 impl ClashClass {
     /// All classes, in the order of their numbers.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Apart,
         Self::Near,
         Self::Touching,
@@ -50,12 +56,24 @@ impl ClashClass {
         Self::Duplicated,
         Self::Undecided,
         Self::Intersecting,
+        Self::Piercing,
+        Self::Protruding,
     ];
 
     /// Returns its name: `apart`, `near` and so on.
     pub fn name(self) -> &'static str {
-        ["apart", "near", "touching", "overlapping", "contained", "duplicated", "undecided", "intersecting"]
-            [self as usize & 7]
+        match self {
+            Self::Apart => "apart",
+            Self::Near => "near",
+            Self::Touching => "touching",
+            Self::Overlapping => "overlapping",
+            Self::Contained => "contained",
+            Self::Duplicated => "duplicated",
+            Self::Undecided => "undecided",
+            Self::Intersecting => "intersecting",
+            Self::Piercing => "piercing",
+            Self::Protruding => "protruding",
+        }
     }
 }
 
@@ -73,6 +91,9 @@ pub struct Clash {
     /// For parts that touch, overlap or are undecided: the bounds of their depth, both 0 without a common point. Parts that are not
     /// closed have none.
     pub depth: Option<Penetration>,
+    /// What the parts have in common, if magnitudes are asked for and the parts overlap, are undecided, contain each other or are
+    /// duplicated.
+    pub magnitudes: Option<Intersection>,
     /// A point of the clash in A's frame: between the closest points, in both parts, or in contact.
     pub point: [f64; 3],
 }
@@ -91,6 +112,9 @@ options! {
         relative_gap(f64): f64 = 0.1,
         /// The most visits of the search for the depth of a pair: see [`Querier::set_budget`], whose budget limits it, too.
         visits(u64): u64 = 1 << 20,
+        /// Whether to measure what parts have in common ([`Querier::intersection`]), and to divide overlapping ones into piercing and
+        /// protruding ones.
+        magnitudes(bool): bool = false,
     }
 }
 
@@ -117,7 +141,7 @@ impl Querier {
     /// `lower` is at most the tolerance, and `upper` how far it has to be pulled.
     ///
     /// Cost: that of `within` with the tolerance or the clearance, whichever is larger, for parts that are farther apart than
-    /// both. Others also take `collide`, and a `distance` or a `penetration`.
+    /// both. Others also take `collide`, and a `distance` or a `penetration`; magnitudes take an `intersection`.
     ///
     /// # Errors
     /// [`QueryError::Number`] if an option is invalid; else the errors of [`Querier::relation`].
@@ -128,9 +152,32 @@ impl Querier {
         pose: &Pose,
         options: &ClashOptions,
     ) -> Result<Clash, QueryError> {
+        self.clash_along(a.into(), b.into(), pose, options, AXES)
+    }
+
+    /// Returns how two parts lie, with a box of what they have in common along some directions.
+    pub(crate) fn clash_along(
+        &mut self,
+        a: Shape<'_>,
+        b: Shape<'_>,
+        pose: &Pose,
+        options: &ClashOptions,
+        axes: [[f64; 3]; 3],
+    ) -> Result<Clash, QueryError> {
         options.check()?;
         self.start();
-        self.clash_of(a.into(), b.into(), pose, options)
+        let mut clash = self.clash_of(a, b, pose, options)?;
+        use ClashClass::{Contained, Duplicated, Overlapping, Piercing, Protruding, Undecided};
+        let is_shared = matches!(clash.class, Overlapping | Undecided | Contained | Duplicated);
+        if options.magnitudes && is_shared && a.is_closed()? && b.is_closed()? {
+            let shared = self.intersection_along(a, b, pose, axes)?;
+            if clash.class == Overlapping {
+                let pierces = shared.pierced_a.or(shared.pierced_b).is_some();
+                clash.class = if pierces { Piercing } else { Protruding };
+            }
+            clash.magnitudes = Some(shared);
+        }
+        Ok(clash)
     }
 
     fn clash_of(
@@ -147,7 +194,8 @@ impl Querier {
         let touches =
             is_within_reach && (reach == 0.0 || self.cores_within(a, b, pose, sum_of_radii(a, b))?);
         let relation = if touches { Relation::Touching } else { self.relation_of_disjoint(a, b, pose)? };
-        let clash = |class, point| Clash { class, relation, distance: 0.0, depth: None, point };
+        let clash =
+            |class, point| Clash { class, relation, distance: 0.0, depth: None, magnitudes: None, point };
         let is_disjoint = matches!(relation, Relation::Apart | Relation::Undefined);
         if is_disjoint && !is_within_reach {
             return Ok(Clash { distance: f64::INFINITY, ..clash(ClashClass::Apart, [0.0; 3]) });

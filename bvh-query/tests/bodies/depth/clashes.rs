@@ -54,6 +54,53 @@ fn pairs_have_the_class_that_their_gap_and_depth_say() {
     }
 }
 
+/// A scene gives the box of what is shared in the world, wherever its parts are.
+#[test]
+fn overlapping_parts_pierce_or_protrude() {
+    let block = |half: [f64; 3]| {
+        baked(
+            &outward(cube()).iter().map(|t| t.map(|p| [0, 1, 2].map(|k| p[k] * half[k]))).collect::<Vec<_>>(),
+        )
+    };
+    let (wall, duct, open) = (block([4.0, 0.125, 4.0]), block([0.5, 3.0, 0.25]), baked(&plate(2)));
+    let options = ClashOptions::new().magnitudes(true);
+    for mut querier in queriers() {
+        for (at, class, volume, pierced) in [
+            ([0.0, 1.0, 0.0], ClashClass::Piercing, 0.125, Some(0.25)),
+            ([0.0, 3.0, 0.0], ClashClass::Protruding, 0.0625, None),
+            ([0.0, 3.0625, 0.0], ClashClass::Protruding, 0.03125, None),
+        ] {
+            let pose = translation(at[0], at[1], at[2]);
+            let found = ask(&mut querier, &wall, &duct, &pose, &options);
+            let shared = found.magnitudes.unwrap();
+            assert!(
+                found.class == class && (shared.volume - volume).abs() <= shared.volume_error,
+                "{found:?}"
+            );
+            assert_eq!((shared.pierced_a, shared.pierced_b), (pierced, None));
+            let without = ask(&mut querier, &wall, &duct, &pose, &ClashOptions::new());
+            assert_eq!((without.class, without.magnitudes), (ClashClass::Overlapping, None));
+        }
+        for (a, b, at, class, has) in [
+            (&wall, &wall, [0.0; 3], ClashClass::Duplicated, true),
+            (&wall, &open, [0.0; 3], ClashClass::Intersecting, false),
+            (&wall, &duct, [0.0, 3.125, 0.0], ClashClass::Touching, false),
+        ] {
+            let found = ask(&mut querier, a, b, &translation(at[0], at[1], at[2]), &options);
+            assert_eq!((found.class, found.magnitudes.is_some()), (class, has), "{found:?}");
+        }
+    }
+    let turned = Pose::new([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [10.0, 20.0, 30.0]).unwrap();
+    let beside = Pose::new(*turned.rotation(), turned.place([0.0, 1.0, 0.0])).unwrap();
+    let mut scene = Scene::new().unwrap();
+    for (bvh, pose) in [(wall, turned), (duct, beside)] {
+        scene.add(bvh, pose).unwrap();
+    }
+    let found = scene.clashes(&options).unwrap();
+    let shared = found[0].clash.magnitudes.unwrap();
+    assert_eq!((found.len(), shared.bounds), (1, Some([[9.875, 19.5, 29.75], [10.125, 20.5, 30.25]])));
+}
+
 /// A peg in a hole without a gap touches on all sides: no way out is short, and nothing is deep.
 #[test]
 fn a_tight_fit_is_undecided_with_its_bounds() {
