@@ -111,7 +111,10 @@ impl Querier {
         let translation = line.along(face.normal).translation_at(at);
         let upper = length_above(translation);
         let lower = (inside + line.radii).next_down().min(upper);
-        let (common, points) = (polytope.common(), [of_a, of_b]);
+        // Those of the cores, moved out to the surfaces.
+        let out = |from: Point, radius: f64| [0, 1, 2].map(|k| from[k] + radius * face.normal[k]);
+        let points = [out(of_a, a.radius()), out(of_b, -b.radius())];
+        let common = polytope.common();
         Ok(Some(ConvexDepth { lower, upper, translation, common, points, is_spent }))
     }
 }

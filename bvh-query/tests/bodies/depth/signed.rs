@@ -4,7 +4,9 @@ use super::moved;
 use crate::common::shapes::{cube, moved as at, outward, sphere};
 use crate::common::{Random, bake, baked, queriers, random_pose, translation};
 use bvh_bake::{Options, shapes};
-use bvh_query::{Bvh, PenetrationOptions, Pose, Querier, QueryError, Relation, SignedDistance, Tracker};
+use bvh_query::{
+    Bvh, OwnedShape, PenetrationOptions, Pose, Querier, QueryError, Relation, SignedDistance, Tracker,
+};
 
 /// Asks on all backends, through a tracker and in a batch, which all have to agree; checks what the answer says of itself.
 #[track_caller]
@@ -72,6 +74,31 @@ fn a_block_that_passes_through_another_one() {
     for querier in &queriers {
         let batch = bvh_query::Batch::with_backend(&a, &b, querier.backend());
         assert_eq!(batch.signed_distances(&poses, &PenetrationOptions::new()).as_ref(), Ok(&all));
+    }
+}
+
+/// Radii are part of the shapes: the points are on what they reach, also where the cores only touch.
+#[test]
+fn points_are_on_the_surfaces_that_radii_make() {
+    let [a, b] = [[2.0, 4.0, 4.0], [1.0, 1.0, 1.0]]
+        .map(|sides| bake(&shapes::block(sides).unwrap(), &Options::default()));
+    let options = PenetrationOptions::new().relative_gap(1e-9);
+    for querier in &mut queriers() {
+        for radii in [[0.0, 0.25], [0.125, 0.0], [0.125, 0.25]] {
+            let rounded = |shape, radius| OwnedShape::from(shape).rounded(radius).unwrap();
+            let [a, b] = [rounded(a.clone(), radii[0]), rounded(b.clone(), radii[1])];
+            for x in [2.5, 1.625, 1.5, 1.25, 0.5, -1.25] {
+                let found = querier.signed_distance(&a, &b, &translation(x, 0.25, 0.0), &options).unwrap();
+                let [of_a, of_b] = [1.0 + radii[0], x.abs() - 0.5 - radii[1]];
+                let toward = |point: [f64; 3]| point[0] * x.signum();
+                let known = [of_b - of_a, of_b - of_a, of_a, of_b];
+                let given = [found.lower, found.upper, toward(found.point_a), toward(found.point_b)];
+                assert!(
+                    given.iter().zip(known).all(|(x, y)| (x - y).abs() < 1e-9),
+                    "{x}, {radii:?}: {found:?}"
+                );
+            }
+        }
     }
 }
 
