@@ -212,6 +212,8 @@ impl Asker {
         options: &PenetrationOptions,
     ) -> Result<Option<(usize, SignedDistance)>, RobotError> {
         self.place(setting, joints)?;
+        // A robot without pairs would not refuse them.
+        options.check()?;
         let mut nearest: Option<(usize, SignedDistance)> = None;
         for (gap, number) in self.by_gaps(setting) {
             let [lower, upper] =

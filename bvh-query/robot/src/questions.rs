@@ -91,8 +91,8 @@ impl Robot {
     /// Cost: that of [`Robot::distance`], and a depth for each pair that overlaps.
     ///
     /// # Errors
-    /// The errors of [`Robot::collide`]; [`RobotError::Pair`] also if an option is invalid, or if a file in question was baked without
-    /// topology.
+    /// The errors of [`Robot::collide`]; [`RobotError::Query`] if an option is invalid; [`RobotError::Pair`] also if a file in question
+    /// was baked without topology.
     pub fn signed_distance(
         &mut self,
         joints: &[f64],

@@ -1,6 +1,6 @@
 //! Files that are not as they should be, and numbers that no joint can have: one clear error each.
 
-use bvh_query::{MotionOptions, Pose};
+use bvh_query::{MotionOptions, PenetrationOptions, Pose};
 use cbvh_robot::{Base, Edge, Robot, RobotError, RobotOptions};
 
 fn read(text: &str) -> Result<Robot, RobotError> {
@@ -115,6 +115,15 @@ fn numbers_that_no_joint_can_have_are_refused() {
         let answer = two_balls().is_free(&[0.0], &[radians]);
         let is_refused = matches!(answer, Err(RobotError::Value { .. }));
         assert!(is_refused && radians > 16384.0 || answer.is_ok(), "{radians}: {answer:?}");
+    }
+    // Also without pairs.
+    let options = PenetrationOptions::new();
+    assert!(matches!(robot.signed_distance(&[0.0], &options), Ok(None)));
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        for options in [options.relative_gap(bad), options.tolerance(bad)] {
+            assert!(matches!(robot.signed_distance(&[0.0], &options), Err(RobotError::Query(_))));
+            assert!(matches!(robot.signed_distance_many(&[0.0], &options), Err(RobotError::Query(_))));
+        }
     }
     // Also if no pair comes near.
     robot.add_obstacle("o", robot_shape(), &Pose::IDENTITY).unwrap();

@@ -78,7 +78,11 @@ impl PenetrationOptions {
             || self.tolerance.is_some_and(|tolerance| lower > tolerance || upper <= tolerance)
     }
 
-    pub(crate) fn check(&self) -> Result<(), QueryError> {
+    /// Returns an error for the numbers that every query refuses.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the relative gap or the tolerance is not a valid number.
+    pub fn check(&self) -> Result<(), QueryError> {
         check(NumberError::RelativeGap, self.relative_gap)?;
         if self.relative_gap == 0.0 {
             return Err(NumberError::RelativeGap(0.0).into());
