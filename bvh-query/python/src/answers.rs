@@ -175,20 +175,24 @@ pub(crate) fn penetrations<'py>(
 }
 
 /// Lower and upper bound, normal, points of A and B, translation, whether there is a depth, and whether the search was ended early.
+/// Where nothing is near, the bounds are infinite.
 pub(crate) fn signed_distances<'py>(
     to: Answers<'py>,
-    of: &[SignedDistance],
+    of: impl Iterator<Item = Option<SignedDistance>> + Clone,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let of = || of.iter();
+    let numbers =
+        |part: fn(SignedDistance) -> f64| to.values(of.clone().map(|of| of.map_or(f64::INFINITY, part)));
+    let points =
+        |part: fn(SignedDistance) -> [f64; 3]| to.rows(of.clone().map(|of| of.map_or([f64::NAN; 3], part)));
     (
-        to.values(of().map(|of| of.lower))?,
-        to.values(of().map(|of| of.upper))?,
-        to.rows(of().map(|of| of.normal))?,
-        to.rows(of().map(|of| of.point_a))?,
-        to.rows(of().map(|of| of.point_b))?,
-        to.rows(of().map(|of| of.translation))?,
-        to.values(of().map(|of| of.is_signed))?,
-        to.values(of().map(|of| of.is_spent))?,
+        numbers(|of| of.lower)?,
+        numbers(|of| of.upper)?,
+        points(|of| of.normal)?,
+        points(|of| of.point_a)?,
+        points(|of| of.point_b)?,
+        points(|of| of.translation)?,
+        to.values(of.clone().map(|of| of.is_some_and(|of| of.is_signed)))?,
+        to.values(of.clone().map(|of| of.is_some_and(|of| of.is_spent)))?,
     )
         .into_pyobject(to.py)
 }

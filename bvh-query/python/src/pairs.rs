@@ -175,7 +175,7 @@ pub(crate) fn signed_distance<'py>(
         |batch, poses| batch.signed_distances(poses, &options),
         |querier, [a, b], pose| querier.signed_distance(a, b, pose, &options),
     )?;
-    answers::signed_distances(question.answers(), &found)
+    answers::signed_distances(question.answers(), found.iter().copied().map(Some))
 }
 
 /// Clearance, tolerance, relative gap and the most visits of the search for a depth.

@@ -1,10 +1,11 @@
 //! Robots: a question takes a snapshot, and runs without Python's lock and without that of the robot.
 
-use crate::answers::{array, matrix};
+use crate::answers::{Answers, array, matrix, signed_distances};
 use crate::arguments::pose_or_identity;
 use crate::asking::{detached, in_turns, on_pool};
 use crate::errors::{backend_error, bake_error, open_error, query_error, question_error, system_error};
 use crate::mesh::Mesh;
+use crate::pairs::depth_options;
 use crate::paths::locked;
 use bvh_query::{MotionOptions, OwnedShape, Pose};
 use cbvh_robot::{
@@ -13,6 +14,7 @@ use cbvh_robot::{
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -44,6 +46,8 @@ type Parts =
 
 /// The nearest bodies: whether there are any, the distance and its bounds, both names, and the points in the world.
 type Nearest = (bool, [f64; 3], [String; 2], [[f64; 3]; 2]);
+/// The names of both bodies, if there are any, for each row, and the parts of the signed distances, in the world.
+type NearestSigned<'py> = (Vec<Option<[String; 2]>>, Bound<'py, PyTuple>);
 /// A named configuration: its group, its name, and values at the places of joints.
 type State = (String, String, Vec<(usize, f64)>);
 /// How a motion ends: 0 free, 1 hit, 2 near; until when it is free, when it ends, with what joint values, bodies and distance.
@@ -487,6 +491,31 @@ impl Robot {
             None => (false, [f64::INFINITY; 3], Default::default(), [[f64::NAN; 3]; 2]),
         };
         Ok(found.into_iter().map(answer).collect())
+    }
+
+    /// Asks about rows, which are one alone or many.
+    fn signed_distance<'py>(
+        &self,
+        py: Python<'py>,
+        joints: PyReadonlyArray2<'_, f64>,
+        one: bool,
+        relative_gap: &Bound<'py, PyAny>,
+        tolerance: Option<&Bound<'py, PyAny>>,
+        parallel: bool,
+    ) -> PyResult<NearestSigned<'py>> {
+        let (rows, options) = (rows(&joints)?, depth_options(relative_gap, tolerance)?);
+        // Without rows, too, the options are checked.
+        options.check().map_err(query_error)?;
+        let found = self.each(
+            py,
+            &rows,
+            parallel,
+            |robot, row| robot.signed_distance(row, &options),
+            |robot, rows| robot.signed_distance_many(rows, &options),
+        )?;
+        let nearest = found.iter().map(|of| of.as_ref().map(|of| of.nearest));
+        let nearest = signed_distances(Answers { py, one }, nearest)?;
+        Ok((found.into_iter().map(|of| of.map(|of| of.bodies)).collect(), nearest))
     }
 
     fn is_free<'py>(

@@ -4,7 +4,7 @@ use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
 use crate::arguments::number;
 use crate::asking::on_pool;
 use crate::motions::options;
-use crate::pairs::ClashLimits;
+use crate::pairs::{ClashLimits, depth_options};
 use crate::paths::{AnyPath, until_raised};
 use crate::scene::{Scene, State};
 use bvh_query::{Distance, InstanceId, RigidPath, SceneDistance, SceneError, SceneMotionAnswer, ScenePair};
@@ -14,7 +14,7 @@ use pyo3::types::PyTuple;
 
 type Pairs<'py> = Bound<'py, PyArray2<i64>>;
 
-/// A pair and its distance, or `None` where there is no pair.
+/// A pair and its distance or signed distance, or `None` where there is no pair.
 type Nearest<'py> = Option<(i64, i64, Bound<'py, PyTuple>)>;
 
 fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], Distance)>) -> PyResult<Nearest<'py>> {
@@ -102,6 +102,24 @@ pub(crate) fn scene_distance<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Ne
         found.map(|found| (state.pair(found.pair), found.nearest))
     };
     nearest(py, scene.ask(py, |scene| scene.distance(), read)?)
+}
+
+#[pyfunction]
+pub(crate) fn scene_signed_distance<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    relative_gap: &Bound<'py, PyAny>,
+    tolerance: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Nearest<'py>> {
+    let options = depth_options(relative_gap, tolerance)?;
+    let found = scene.ask(
+        py,
+        |scene| scene.signed_distance(&options),
+        |state, found| found.map(|found| (state.pair(found.pair), found.nearest)),
+    )?;
+    let Some(([a, b], nearest)) = found else { return Ok(None) };
+    let nearest = answers::signed_distances(Answers { py, one: true }, std::iter::once(Some(nearest)))?;
+    Ok(Some((a, b, nearest)))
 }
 
 /// Instances and their paths.

@@ -321,17 +321,64 @@ class Describing(unittest.TestCase):
         self.assertIs(robot.is_free([], []), True)
         nearest = robot.distance([])
         self.assertEqual((nearest.distance, nearest.bodies), (math.inf, None))
+        bodies, signed = robot.signed_distance([])
+        self.assertEqual((bodies, signed.lower, signed.upper, signed.is_signed), (None, math.inf, math.inf, False))
+        self.assertTrue(np.isnan(signed.normal).all() and signed.point_a.shape == (3,))
         robot.add_obstacle(cbvh.sphere(0.5), shifts([1.5, 0, 0])[0], name="ball")
         self.assertEqual(robot.pairs, [("post", "ball")])
         for parallel in (False, True):
             self.assertEqual(robot.collide(np.zeros((3, 0)), parallel=parallel).tolist(), [False] * 3)
             self.assertEqual(robot.distance(np.zeros((3, 0)), parallel=parallel).distance.tolist(), [0.5] * 3)
+            bodies, signed = robot.signed_distance(np.zeros((3, 0)), parallel=parallel)
+            self.assertEqual(bodies, [("post", "ball")] * 3)
+            np.testing.assert_allclose(signed.lower, [0.5] * 3, rtol=1e-12)
             self.assertEqual(robot.is_free(np.zeros((3, 0)), [], parallel=parallel).tolist(), [True] * 3)
         robot.set_pose("ball", shifts([1, 0, 0])[0])
         self.assertIs(robot.collide([]), True)
         self.assertIs(robot.is_free([], []), False)
         self.assertEqual(robot.motion([], []).kind, MotionKind.HIT)
 
+    def test_a_block_passes_through_another_one(self):
+        block = '<collision><geometry><box size="{}"/></geometry></collision>'
+        path = self.write(
+            "slide.urdf",
+            f'<robot name="slide"><link name="foot"/><link name="rail">{block.format("2 4 4")}</link>'
+            f'<link name="cart">{block.format("1 1 1")}</link>'
+            '<joint name="up" type="fixed"><parent link="foot"/><child link="rail"/><origin xyz="1 2 3" rpy="0.3 -0.7 2"/></joint>'
+            '<joint name="x" type="prismatic"><parent link="rail"/><child link="cart"/><origin xyz="0 0.25 0"/>'
+            '<limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>',
+        )
+        robot, x = cbvh.Robot.from_urdf(path), np.arange(-24, 25) / 8
+        rail = robot.link_poses([0])[1]
+        of_cart = np.sign(x)[:, None] * rail[:3, 0]
+        bodies, found = robot.signed_distance(x[:, None])
+        self.assertEqual(set(bodies), {("rail", "cart")})
+        np.testing.assert_allclose(found.lower, np.abs(x) - 1.5, atol=1e-9)
+        is_clear = (x != 0) & (np.abs(x) != 1.5)
+        np.testing.assert_allclose(found.normal[is_clear], of_cart[is_clear], atol=1e-9)
+        # A post is always 0.75 from the rail. A margin of the cart makes the other number less.
+        robot.add_obstacle(cbvh.box([1, 1, 1]), rail @ shifts((0, -3.25, 0))[0], name="post")
+        robot.set_margin("cart", 0.0625)
+        number, is_cart = np.minimum(np.abs(x) - 1.5625, 0.75), np.abs(x) < 2.3125
+        for parallel in (False, True):
+            bodies, found = robot.signed_distance(x[:, None], relative_gap=1e-6, parallel=parallel)
+            self.assertEqual([of == ("rail", "cart") for of in bodies], is_cart.tolist())
+            self.assertEqual(set(bodies), {("rail", "cart"), ("rail", "post")})
+            self.assertTrue(np.all(found.lower <= number + 1e-12) and np.all(number - 1e-12 <= found.upper))
+            np.testing.assert_allclose(found.upper, found.lower, atol=1e-6)
+            normals = np.where(is_cart[:, None], of_cart, -rail[:3, 1])
+            np.testing.assert_allclose(found.normal[x != 0], normals[x != 0], atol=1e-9)
+            np.testing.assert_allclose(np.sum(found.normal * (found.point_b - found.point_a), axis=1), number, atol=1e-6)
+            in_rail = (found.point_a - rail[:3, 3]) @ rail[:3, :3]
+            np.testing.assert_allclose(np.where(is_cart, np.abs(in_rail[:, 0]), -in_rail[:, 1] / 2), 1, atol=1e-6)
+            np.testing.assert_allclose(np.linalg.norm(found.translation, axis=1), np.maximum(-found.lower, 0), atol=1e-9)
+            self.assertTrue(found.is_signed.all() and not found.is_spent.any())
+        # What is not closed has no depth.
+        corners, faces = cube()
+        robot.attach(cbvh.bake(corners, faces[2:]), "cart", name="open", may_touch=["cart"])
+        robot.allow("rail", "cart")
+        bodies, found = robot.signed_distance([1])
+        self.assertEqual((bodies, found.lower, found.is_signed, found.translation.tolist()), (("rail", "open"), 0, False, [0, 0, 0]))
 
 class Asking(unittest.TestCase):
     """Answers beside those about meshes."""
@@ -351,6 +398,7 @@ class Asking(unittest.TestCase):
         ]
         self.assertEqual({frozenset(pair) for pair in robot.pairs}, {frozenset(pair) for pair in pairs})
         touching, nearest = robot.pairs_in_contact(rows), robot.distance(rows)
+        overlapping, signed = robot.signed_distance(rows)
         for number, row in enumerate(rows):
             values = dict(zip(robot.joints, row))
             world = {n: (kinematics.pose(link, values) if link else np.eye(4)) @ pose for n, (link, _, pose) in of.items()}
@@ -365,6 +413,13 @@ class Asking(unittest.TestCase):
             self.assertAlmostEqual(apart, least, delta=1e-9)
             a, b = nearest.bodies[number]
             self.assertAlmostEqual(of[a][1].distance(of[b][1], poses[a, b]).distance, least, delta=1e-12)
+            deepest = min(of[a][1].signed_distance(of[b][1], pose).lower for (a, b), pose in poses.items())
+            self.assertAlmostEqual(signed.lower[number], deepest, delta=1e-9)
+            a, b = overlapping[number]
+            self.assertAlmostEqual(of[a][1].signed_distance(of[b][1], poses[a, b]).lower, deepest, delta=1e-9)
+            free = world[b].copy()
+            free[:3, 3] += 1.000001 * signed.translation[number]
+            self.assertEqual(of[a][1].relation(of[b][1], cbvh.relative(world[a], free)), cbvh.Relation.APART)
         collide = robot.collide(rows)
         self.assertEqual(collide.tolist(), [bool(pairs) for pairs in touching])
         self.assertTrue(30 < collide.sum() < 270)
@@ -377,14 +432,17 @@ class Asking(unittest.TestCase):
         for parallel in (False, True):
             kinds = {"parallel": parallel}
             distance = robot.distance(rows, **kinds)
+            bodies, signed = robot.signed_distance(rows, **kinds)
             answers[parallel] = (
                 robot.collide(rows, **kinds).tolist(),
                 robot.pairs_in_contact(rows, **kinds),
                 [np.asarray(of).tolist() for of in distance],
                 robot.is_free(rows, ends, **kinds).tolist(),
+                bodies,
+                [of.tolist() for of in signed],
             )
         self.assertEqual(*answers.values())
-        collide, pairs, (distance, lower, upper, bodies, points), free = answers[False]
+        collide, pairs, (distance, lower, upper, bodies, points), free, overlapping, signed = answers[False]
         self.assertEqual((len(collide), np.shape(points)), (100, (100, 2, 3)))
         self.assertTrue(10 < sum(free) < 90)
         for number, (row, end) in enumerate(zip(rows.tolist(), ends)):
@@ -394,6 +452,10 @@ class Asking(unittest.TestCase):
             self.assertEqual((one.distance, one.lower, one.upper), (distance[number], lower[number], upper[number]))
             self.assertEqual((list(one.bodies), one.points.tolist()), (bodies[number], points[number]))
             self.assertIs(robot.is_free(row, end), free[number])
+            one = robot.signed_distance(row)
+            self.assertEqual((one.bodies, [np.asarray(of).tolist() for of in one.nearest]),
+                             (overlapping[number], [of[number] for of in signed]))
+            self.assertEqual({type(of) for of in (one.nearest.lower, one.nearest.upper)}, {float})
         # One row serves all of the other argument, and arrays may be of any kind.
         first = [robot.is_free(rows[0], end) for end in ends]
         self.assertEqual(robot.is_free(rows[0], ends).tolist(), first)
@@ -406,6 +468,8 @@ class Asking(unittest.TestCase):
             self.assertEqual(robot.collide(none, parallel=parallel).shape, (0,))
             self.assertEqual(robot.pairs_in_contact(none, parallel=parallel), [])
             self.assertEqual(robot.distance(none, parallel=parallel).points.shape, (0, 2, 3))
+            bodies, signed = robot.signed_distance(none, parallel=parallel)
+            self.assertEqual((bodies, signed.lower.shape, signed.point_a.shape), ([], (0,), (0, 3)))
             self.assertEqual(robot.is_free(none, none, parallel=parallel).shape, (0,))
         self.assertEqual(robot.link_poses(none).shape, (0, 5, 4, 4))
 
@@ -948,6 +1012,10 @@ class Misuse(unittest.TestCase):
                 (ValueError, "clearance", lambda: robot.is_free(q, q, clearance=-1)),
                 (ValueError, "clearance", lambda: robot.motion(q, q, clearance=math.inf)),
                 (ValueError, "tolerance", lambda: robot.is_free(q, q, tolerance=math.nan)),
+                (ValueError, "joint elbow: expected a finite value, found NaN", robot.signed_distance, none),
+                (ValueError, "relative_gap: expected a finite part above 0", lambda: robot.signed_distance(q, relative_gap=0)),
+                (ValueError, "tolerance: expected a finite depth", lambda: robot.signed_distance(np.zeros((0, 4)), tolerance=-1)),
+                (TypeError, "tolerance: expected a number, found str", lambda: robot.signed_distance(q, tolerance="x")),
                 (ValueError, "one configuration each", robot.motion, [q], q),
                 (ValueError, "coefficients: expected shape (4, degree + 1)", robot.motion_along, np.zeros((3, 2))),
                 (ValueError, "coefficients: expected shape (4, degree + 1)", robot.motion_along, np.zeros((4, 0))),

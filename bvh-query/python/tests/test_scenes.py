@@ -143,6 +143,58 @@ class Pairs(unittest.TestCase):
             self.assertEqual((none.pairs.shape, none.nearest.point_a.shape), ((0, 2), (0, 3)))
             self.assertEqual(none.nearest.triangle_a.dtype, np.uint32)
 
+    def test_the_least_signed_distance_is_that_of_all_pairs(self):
+        scene, signs = self.scene(1), []
+        for _ in range(2):
+            asked = Asked(scene)
+            poses = [cbvh.relative(scene.pose(a), scene.pose(b)) for a, b, *_ in asked.pairs]
+            answers = [(a, b, of_a.signed_distance(of_b, pose)) for (a, b, of_a, of_b, _), pose in zip(asked.pairs, poses)]
+            a, b, expected = min(answers, key=lambda answer: answer[2].lower)
+            signs.append(np.sign(expected.lower))
+            for scene.parallel, scene.tracking in itertools.product((False, True), repeat=2):
+                found = scene.signed_distance()
+                self.assertEqual((found.a, found.b), (a, b))
+                self.assertEqual(list(map(type, found.nearest)), list(map(type, expected)))
+                for part, of_pair in zip(found.nearest, expected):
+                    np.testing.assert_array_equal(part, of_pair)
+            # Without those that overlap, the nearest pair is the answer.
+            for a, b, of_pair in answers:
+                scene.set_allowed(a, b, of_pair.lower <= 0)
+        self.assertEqual(signs, [-1, 1])
+
+    def test_a_block_passes_through_another_one(self):
+        # The third one is always 0.75 from the large one, which it faces.
+        scene, around = cbvh.Scene(), random_poses(9, 1, 5.0)[0]
+        corners, faces = cube()
+        large, third = scene.add(cbvh.bake(corners * [2, 4, 4], faces), around), scene.add(self.meshes[0])
+        small = scene.add(self.meshes[0])
+        scene.set_pose(third, around @ shifts((0, -3.25, 0))[0])
+        for x in np.arange(-24, 25) / 8:
+            scene.set_pose(small, around @ shifts((x, 0.25, 0))[0])
+            of_small, of_third = (abs(x) - 1.5, small, np.sign(x) * around[:3, 0]), (0.75, third, -around[:3, 1])
+            number, other, along = of_small if of_small[0] < 0.75 else of_third
+            for gap in (1e-6, 1.0):
+                found = scene.signed_distance(relative_gap=gap)
+                self.assertTrue(found.nearest.lower <= number + 1e-12 and number - 1e-12 <= found.nearest.upper)
+                self.assertLess(found.nearest.upper - found.nearest.lower, 1e-9 + gap * abs(number))
+                if abs(x) == 2.25:
+                    continue
+                self.assertEqual((found.a, found.b), (large, other))
+                if abs(x) not in (0, 1.5) and gap < 1:
+                    np.testing.assert_allclose(around[:3, :3] @ found.nearest.normal, along, atol=1e-9)
+        # A margin makes it less.
+        scene.set_pose(small, around @ shifts((1, 0.25, 0))[0])
+        scene.set_margin(large, 0.125)
+        self.assertAlmostEqual(scene.signed_distance().nearest.lower, -0.625, places=9)
+        # What is not closed has no depth, and where it touches, the number is 0.
+        scene.set_mesh(small, cbvh.bake(corners, faces[2:]))
+        found = scene.signed_distance()
+        self.assertEqual(({found.a, found.b}, found.nearest.is_signed), ({large, small}, False))
+        self.assertEqual((found.nearest.lower, found.nearest.translation.tolist()), (0, [0, 0, 0]))
+        scene.remove(small)
+        scene.remove(third)
+        self.assertIsNone(scene.signed_distance())
+
     def test_closest_points_of_some_instances(self):
         scene = self.scene(7)
         points = np.random.default_rng(8).uniform(-4, 4, (100, 3))
@@ -213,6 +265,7 @@ class Pairs(unittest.TestCase):
         self.assertEqual((scene.pairs_within(3).shape, scene.contacts().triangles.shape), ((0, 2), (0, 4)))
         self.assertEqual((scene.sides([0, 0, 0]), scene.closest_points([0, 0, 0]).instance), (Side.OUTSIDE, -1))
         self.assertTrue(np.isnan(scene.signed_point_distances([0, 0, 0])))
+        self.assertIsNone(scene.signed_distance(relative_gap=0.1, tolerance=1))
 
     def test_probes_meet_the_nearest_instance(self):
         scene = cbvh.Scene()
@@ -529,6 +582,9 @@ class Misuse(unittest.TestCase):
             (TypeError, "ids: expected the number or the name of an instance, found float", scene.poses, [0.5]),
             (ValueError, "d: expected a finite distance of at least 0, found -1", scene.within, -1),
             (ValueError, "d: expected a finite distance of at least 0, found NaN", scene.pairs_within, np.nan),
+            (ValueError, "relative_gap: expected a finite part above 0, found 0", lambda: scene.signed_distance(relative_gap=0)),
+            (ValueError, "tolerance: expected a finite depth of at least 0", lambda: scene.signed_distance(tolerance=np.nan)),
+            (TypeError, "tolerance: expected a number, found str", lambda: scene.signed_distance(tolerance="x")),
             (ValueError, "points: expected shape (3,) or (N, 3)", scene.sides, [0, 0]),
             (TypeError, "paths: expected a mapping", scene.motion, [motion]),
             (TypeError, f"paths[{here}]: expected a cbvh.Motion", scene.is_free, {here: one}),
@@ -551,6 +607,11 @@ class Misuse(unittest.TestCase):
         scene.add(damaged)
         with self.assertRaisesRegex(cbvh.FormatError, 'instances "whole" and 1: .*R'):
             scene.contacts()
+        with self.assertRaisesRegex(cbvh.FormatError, 'instances "whole" and 1: .*R'):
+            scene.signed_distance()
+        scene.set_mesh(1, cbvh.bake(*cube(), topology=False))
+        with self.assertRaisesRegex(ValueError, 'instances "whole" and 1: .*topology'):
+            scene.signed_distance()
 
 
 class Sharing(unittest.TestCase):

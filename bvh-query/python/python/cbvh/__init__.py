@@ -20,7 +20,8 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 `Mesh.motion` and `Mesh.is_free` tell whether a path is free; the answer is certain at every moment.
 
 **Overlap.** `Mesh.penetration` bounds how deep closed meshes overlap, and gives a translation that separates them.
-`Mesh.signed_distance` is one number for both: the distance of meshes that are apart, and minus the depth of others.
+`Mesh.signed_distance` is one number for both: the distance of meshes that are apart, and minus the depth of others. Scenes
+and robots have it for the pair whose number is the least.
 `Mesh.clash` and `Scene.clashes` tell parts that touch from parts that overlap, are near, contain each other or are there twice.
 `Mesh.contact_regions` and `Mesh.patches` tell where and how surfaces meet, and `Mesh.self_contacts` where a mesh meets
 itself.
@@ -74,6 +75,7 @@ from ._answers import (
     ScenePenetrations,
     SceneRayHit,
     SceneRelations,
+    SceneSignedDistance,
     SelfContactKind,
     SelfContacts,
     Separation,
@@ -85,7 +87,7 @@ from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._poses import nearest_pose, pose, relative
-from ._robot import InsideWarning, Robot, RobotDistance, RobotMotion, _robot_of
+from ._robot import InsideWarning, Robot, RobotDistance, RobotMotion, RobotSignedDistance, _robot_of
 from ._scene import Scene, _scene_of
 from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
 from ._view import View
@@ -118,6 +120,7 @@ __all__ = [
     "Robot",
     "RobotDistance",
     "RobotMotion",
+    "RobotSignedDistance",
     "Scene",
     "SceneClashes",
     "SceneClosestPoint",
@@ -128,6 +131,7 @@ __all__ = [
     "ScenePenetrations",
     "SceneRayHit",
     "SceneRelations",
+    "SceneSignedDistance",
     "SelfContactKind",
     "SelfContacts",
     "Separation",

@@ -430,6 +430,19 @@ class SceneDistance(NamedTuple):
     nearest: Distance
 
 
+class SceneSignedDistance(NamedTuple):
+    """The pair of instances with the least signed distance.
+
+    - ``a``: the number of the instance in whose frame points, normal and translation are given.
+    - ``b``: the number of the other instance.
+    - ``nearest``: the answer of `Mesh.signed_distance`.
+    """
+
+    a: int
+    b: int
+    nearest: SignedDistance
+
+
 class SceneDistances(NamedTuple):
     """Pairs of instances, and how far apart they are.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _cbvh
-from ._answers import Floats, MotionKind
+from ._answers import Floats, MotionKind, SignedDistance
 from ._mesh import Mesh
 
 Paths = Iterable["str | os.PathLike[str]"]
@@ -30,6 +30,16 @@ class RobotDistance(NamedTuple):
     """Their names, or a list of those."""
     points: Any
     """The nearest points of both in the world, shape (2, 3) or (N, 2, 3)."""
+
+
+class RobotSignedDistance(NamedTuple):
+    """The two bodies with the least signed distance, or those of each of N configurations."""
+
+    bodies: Any
+    """Their names, or a list of those. None if no pairs are asked about."""
+    nearest: SignedDistance
+    """How far apart they are or, below zero, how deep they overlap: what `Mesh.signed_distance` answers, but with points, normal
+    and translation in the world. If no pairs are asked about, the bounds are infinite, and the other numbers NaN."""
 
 
 class RobotMotion(NamedTuple):
@@ -394,6 +404,27 @@ class Robot:
             distance, lower, upper = numbers[0].tolist()
             return RobotDistance(distance, lower, upper, bodies[0], points[0])
         return RobotDistance(numbers[:, 0], numbers[:, 1], numbers[:, 2], bodies, points)
+
+    def signed_distance(
+        self,
+        q: ArrayLike,
+        *,
+        relative_gap: float = 0.01,
+        tolerance: float | None = None,
+        parallel: bool = False,
+    ) -> RobotSignedDistance:
+        """The two bodies that overlap most or, where none do, the nearest ones, and their signed distance: the distance, or minus
+        the depth; with arrays for N configurations.
+
+        No other two bodies have a lower one, but for roundings and for how far the bounds of depths are apart. A body inside
+        another one overlaps it, unless one of them is not closed. ``relative_gap`` and ``tolerance`` end the search for each
+        depth, as in `Mesh.signed_distance`. Raises ValueError if an option is wrong, or if a mesh in question was baked without
+        topology. Cost: that of `distance`, and a depth for each pair that overlaps.
+        """
+        rows, one = self._rows(q)
+        names, parts = self._robot.signed_distance(rows, one, relative_gap, tolerance, parallel)
+        bodies = [None if of is None else tuple(of) for of in names]
+        return RobotSignedDistance(bodies[0] if one else bodies, SignedDistance(*parts))
 
     def is_free(
         self,

@@ -28,7 +28,9 @@ from ._answers import (
     ScenePenetrations,
     SceneRayHit,
     SceneRelations,
+    SceneSignedDistance,
     Side,
+    SignedDistance,
     clash_of,
     named,
 )
@@ -365,6 +367,24 @@ class Scene:
     def distance(self) -> SceneDistance | None:
         """The nearest pair and its distance, or None if there are no pairs. Points are in A's frame."""
         return _nearest(_cbvh.scene_distance(self._scene))
+
+    def signed_distance(
+        self, *, relative_gap: float = 0.01, tolerance: float | None = None
+    ) -> SceneSignedDistance | None:
+        """The pair that overlaps most, by its lower bound, or else the nearest pair, and its signed distance: the distance, or
+        minus the depth. None if there are no pairs. A pair of which one is inside the other overlaps, if both are closed.
+
+        The signed distance of every other pair is at least the lower bound of this one, but for roundings of distances. Of equal
+        pairs, the answer is the first. Points, normal and translation are in A's frame. ``relative_gap`` and ``tolerance`` end
+        the search for each depth, as in `Mesh.signed_distance`. Raises ValueError if an option is wrong, or if a mesh in question
+        was baked without topology. Cost: that of `relations`, and a depth for each pair that overlaps; where none does, that of
+        `distance`.
+        """
+        found = _cbvh.scene_signed_distance(self._scene, relative_gap, tolerance)
+        if found is None:
+            return None
+        a, b, nearest = found
+        return SceneSignedDistance(a, b, SignedDistance(*nearest))
 
     def distances(
         self, pairs: ArrayLike | None = None, *, within: float | None = None, parallel: bool = False
