@@ -1103,6 +1103,16 @@ typedef struct cbvh_scene_distance_answer {
     int32_t reserved;
 } cbvh_scene_distance_answer;
 
+/* The pair with the least signed distance. */
+typedef struct cbvh_scene_signed_distance_answer {
+    cbvh_scene_pair pair;
+    /* As cbvh_signed_distances answers, in A's frame. */
+    cbvh_signed_distance nearest;
+    /* 1, or 0 if there are no pairs; the numbers are then NaN or 0. */
+    int32_t found;
+    int32_t reserved;
+} cbvh_scene_signed_distance_answer;
+
 /* The relation of a pair. */
 typedef struct cbvh_scene_relation {
     cbvh_scene_pair pair;
@@ -1129,6 +1139,13 @@ cbvh_status cbvh_scene_collide(cbvh_scene scene, bool *answer);
 cbvh_status cbvh_scene_within(cbvh_scene scene, double d, bool *answer);
 /* Answers which pair is nearest, and how far apart it is. */
 cbvh_status cbvh_scene_distance(cbvh_scene scene, cbvh_scene_distance_answer *answer);
+/* Answers which pair overlaps most, by its lower bound, or else which one is nearest, and its signed distance: the
+ * distance, or minus the depth. A pair of which one is inside the other overlaps, if both are closed. The signed distance
+ * of any other pair is at least that lower bound, but for roundings of distances. It takes the time of
+ * cbvh_scene_relations and of a depth for each pair that overlaps or, where none does, that of cbvh_scene_distance.
+ * CBVH_INVALID_ARGUMENT if a file in question was baked without topology. */
+cbvh_status cbvh_scene_signed_distance(cbvh_scene scene, const cbvh_penetration_options *options,
+                                       cbvh_scene_signed_distance_answer *answer);
 /* Lists all pairs that touch, in ascending order. */
 cbvh_status cbvh_scene_pairs_in_contact(cbvh_scene scene, cbvh_scene_pair *pairs, size_t capacity, size_t *count);
 /* Lists all pairs at most `d` apart, in ascending order. */
@@ -1341,6 +1358,16 @@ typedef struct cbvh_robot_distance_answer {
     int32_t reserved;
 } cbvh_robot_distance_answer;
 
+/* The pair with the least signed distance. */
+typedef struct cbvh_robot_signed_distance_answer {
+    cbvh_body_pair pair;
+    /* Its points, normal and translation are in the world. */
+    cbvh_signed_distance nearest;
+    /* 1, or 0 if there are no pairs; the numbers are then NaN or 0. */
+    int32_t found;
+    int32_t reserved;
+} cbvh_robot_signed_distance_answer;
+
 /* Lists the poses of all links in the world, in the order of cbvh_robot_links, configuration after configuration. */
 cbvh_status cbvh_robot_link_poses(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                   cbvh_pose *poses, size_t capacity, size_t *pose_count);
@@ -1349,6 +1376,13 @@ cbvh_status cbvh_robot_collide(cbvh_robot robot, const double *joints, size_t jo
 /* Answers which pair is nearest, and how far apart it is. */
 cbvh_status cbvh_robot_distances(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                  cbvh_robot_distance_answer *answers);
+/* Answers which pair overlaps most or, where none does, which one is nearest, and its signed distance: the distance, or
+ * minus the depth. No other pair has a lower one, but for roundings and for how far the bounds of depths are apart. A body
+ * inside another one overlaps it, unless one of them is not closed. It takes the time of cbvh_robot_distances, and of a
+ * depth for each pair that overlaps. CBVH_INVALID_ARGUMENT if a file in question was baked without topology. */
+cbvh_status cbvh_robot_signed_distances(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
+                                        const cbvh_penetration_options *options,
+                                        cbvh_robot_signed_distance_answer *answers);
 /* Lists the pairs that touch, configuration after configuration. `counts` gets the number of each, and may be NULL. */
 cbvh_status cbvh_robot_pairs_in_contact(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                         size_t *counts, cbvh_body_pair *pairs, size_t capacity, size_t *pair_count);

@@ -1265,6 +1265,13 @@ public:
         check(cbvh_scene_distance(raw(), &answer));
         return detail::found(answer);
     }
+    /// The pair that overlaps most, or else the nearest one, if there is any pair.
+    std::optional<cbvh_scene_signed_distance_answer> signed_distance(const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        cbvh_scene_signed_distance_answer answer{};
+        check(cbvh_scene_signed_distance(raw(), &raw_options, &answer));
+        return detail::found(answer);
+    }
     std::vector<cbvh_scene_pair> pairs_in_contact() {
         return detail::list<cbvh_scene_pair>(
             room_, [&](cbvh_scene_pair *pairs, std::size_t capacity, std::size_t *count) {
@@ -1654,6 +1661,23 @@ public:
         return detail::found<cbvh_robot_distance_answer>(
             rows.count, [&](cbvh_robot_distance_answer *answers) {
                 return cbvh_robot_distances(raw(), rows.data(), width(rows), rows.count, answers);
+            });
+    }
+    /// The pair that overlaps most or, where none does, the nearest one, if there is any pair.
+    std::optional<cbvh_robot_signed_distance_answer> signed_distance(const Joints &joints,
+                                                                     const PenetrationOptions &options = {}) const {
+        const cbvh_penetration_options raw_options = options.raw();
+        cbvh_robot_signed_distance_answer answer{};
+        check(cbvh_robot_signed_distances(raw(), joints.data(), joints.size(), 1, &raw_options, &answer));
+        return detail::found(answer);
+    }
+    std::vector<std::optional<cbvh_robot_signed_distance_answer>>
+    signed_distance(const std::vector<Joints> &joints, const PenetrationOptions &options = {}) const {
+        const Rows rows("joints", joints);
+        const cbvh_penetration_options raw_options = options.raw();
+        return detail::found<cbvh_robot_signed_distance_answer>(
+            rows.count, [&](cbvh_robot_signed_distance_answer *answers) {
+                return cbvh_robot_signed_distances(raw(), rows.data(), width(rows), rows.count, &raw_options, answers);
             });
     }
     std::vector<cbvh_body_pair> pairs_in_contact(const Joints &joints) const {

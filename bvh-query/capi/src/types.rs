@@ -8,8 +8,8 @@ use bvh_query::{
     Backend, Clash, ClashClass, ClashOptions, ClosestPoint, Contact, ContactRegion, Distance,
     DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, Penetration,
     PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash, SceneClosestPoint,
-    SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SelfContact, SelfContactKind,
-    Separation, Side, SignedDistance, SignedPointDistance,
+    SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SceneSignedDistance, SelfContact,
+    SelfContactKind, Separation, Side, SignedDistance, SignedPointDistance,
 };
 use std::ffi::c_char;
 
@@ -183,6 +183,7 @@ structures! {
     }
     PairRow { a: Instance, b: Instance }
     SceneDistanceRow { pair: PairRow, nearest: DistanceRow, found: i32, reserved: i32 }
+    SceneSignedDistanceRow { pair: PairRow, nearest: SignedDistanceRow, found: i32, reserved: i32 }
     SceneRelationRow { pair: PairRow, relation: i32, reserved: i32 }
     SceneContactRow { pair: PairRow, contact: ContactRow }
     SceneClashRow { pair: PairRow, clash: ClashRow }
@@ -192,6 +193,7 @@ structures! {
     BodyPairRow { a: Body, b: Body }
     FrequentPairRow { pair: BodyPairRow, share: f64 }
     RobotDistanceRow { pair: BodyPairRow, nearest: DistanceRow, found: i32, reserved: i32 }
+    RobotSignedDistanceRow { pair: BodyPairRow, nearest: SignedDistanceRow, found: i32, reserved: i32 }
     RobotMotionRow {
         outcome: i32,
         reserved: i32,
@@ -351,6 +353,7 @@ row!(of: Contact { object_a, triangle_a, object_b, triangle_b } => ContactRow {}
 row!(of: SceneContact { pair, contact } => SceneContactRow {});
 row!(of: SceneClash { pair, clash } => SceneClashRow {});
 row!(of: SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
+row!(of: SceneSignedDistance { pair, nearest } => SceneSignedDistanceRow { found: 1, reserved: 0 });
 row!(of: Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
     => DistanceRow {});
 row!(of: Separation { lower, upper, translation } => SeparationRow {});
@@ -377,7 +380,7 @@ macro_rules! found {
         }
     )* };
 }
-found!(SceneDistanceRow: Self::NONE, HitRow: Self::NONE, PenetrationRow: Self::NONE);
+found!(SceneDistanceRow: Self::NONE, SceneSignedDistanceRow: Self::NONE, HitRow: Self::NONE, PenetrationRow: Self::NONE);
 found!(ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
 
 impl From<SignedPointDistance> for ClosestRow {

@@ -415,6 +415,86 @@ static void signed_distances(void) {
     OK(cbvh_mesh_free(ball));
 }
 
+/* The least signed distance of all pairs of a scene. */
+static void signed_distances_of_scenes(int32_t parallel, int32_t tracking) {
+    /* A block passes through a large one, and a third one is always 0.75 from that. */
+    const double sides[3] = {2, 4, 4};
+    const cbvh_mesh one = cube(1), pair = two_cubes();
+    const cbvh_pose origin = CBVH_IDENTITY, beside = shift(0, -3.25, 0);
+    cbvh_mesh large, open;
+    cbvh_scene scene;
+    cbvh_instance a, b, c;
+    cbvh_scene_signed_distance_answer answer;
+    cbvh_signed_distance number;
+    OK(cbvh_bake_box(sides, &large));
+    OK(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 10, NULL, &open));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+    OK(cbvh_scene_set_parallel(scene, parallel));
+    OK(cbvh_scene_set_tracking(scene, tracking));
+    OK(cbvh_scene_signed_distance(scene, NULL, &answer));
+    CHECK(!answer.found && isnan(answer.nearest.lower) && answer.pair.a.id == 0);
+    OK(cbvh_scene_add(scene, large, &origin, NULL, &a));
+    OK(cbvh_scene_add(scene, one, &origin, NULL, &b));
+    OK(cbvh_scene_add(scene, one, &beside, NULL, &c));
+    const cbvh_penetration_options exact = {.size = sizeof exact, .relative_gap = 1e-6};
+    for (int step = -24; step <= 24; step++) {
+        const double x = step / 8.0;
+        const cbvh_pose way = shift(x, 0.25, 0);
+        OK(cbvh_scene_set_poses(scene, &b, &way, 1));
+        OK(cbvh_scene_signed_distance(scene, &exact, &answer));
+        const bool is_near = fabs(x) < 2.25;
+        const double expected = fmin(fabs(x) - 1.5, 0.75);
+        CHECK(answer.found && answer.nearest.lower <= expected && expected <= answer.nearest.upper);
+        CHECK(answer.nearest.upper - answer.nearest.lower < 1e-9 && answer.nearest.is_signed && !answer.nearest.is_spent);
+        CHECK(answer.pair.a.id == a.id && (fabs(x) == 2.25 || answer.pair.b.id == (is_near ? b.id : c.id)));
+        if (fabs(x) != 2.25) {
+            OK(cbvh_signed_distances(querier, large, one, is_near ? &way : &beside, 1, &exact, &number));
+            CHECK(memcmp(&number, &answer.nearest, sizeof number) == 0);
+        }
+    }
+    /* What is not closed has no depth. */
+    const cbvh_pose across = shift(1, 0.25, 0);
+    OK(cbvh_scene_set_poses(scene, &b, &across, 1));
+    OK(cbvh_scene_set_mesh(scene, b, open));
+    OK(cbvh_scene_signed_distance(scene, NULL, &answer));
+    CHECK(answer.pair.b.id == b.id && answer.nearest.lower == 0 && answer.nearest.upper == 0 && !answer.nearest.is_signed);
+    OK(cbvh_scene_free(scene));
+    /* Of all pairs of several meshes it is the least. */
+    const cbvh_mesh meshes[4] = {one, pair, open, large};
+    random_source source = {13};
+    int deep = 0;
+    for (int round = 0; round < 20; round++) {
+        cbvh_pose worlds[4], pose;
+        cbvh_instance instances[4];
+        OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
+        OK(cbvh_scene_set_parallel(scene, parallel));
+        OK(cbvh_scene_set_tracking(scene, tracking));
+        for (int k = 0; k < 4; k++) {
+            worlds[k] = random_pose(&source, 3);
+            OK(cbvh_scene_add(scene, meshes[k], &worlds[k], NULL, &instances[k]));
+        }
+        OK(cbvh_scene_signed_distance(scene, NULL, &answer));
+        double least = INFINITY;
+        for (int k = 0; k < 4; k++) {
+            for (int j = 0; j < k; j++) {
+                OK(cbvh_pose_relative(&worlds[j], &worlds[k], &pose));
+                OK(cbvh_signed_distances(querier, meshes[j], meshes[k], &pose, 1, NULL, &number));
+                least = fmin(least, number.lower);
+                CHECK(answer.pair.a.id != instances[j].id || answer.pair.b.id != instances[k].id ||
+                      memcmp(&number, &answer.nearest, sizeof number) == 0);
+            }
+        }
+        CHECK(answer.nearest.lower == least);
+        deep += least < 0;
+        OK(cbvh_scene_free(scene));
+    }
+    CHECK(deep > 0 && deep < 20);
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(pair));
+    OK(cbvh_mesh_free(open));
+    OK(cbvh_mesh_free(large));
+}
+
 /* Where a mesh meets itself: pairs of triangles of each kind, far apart from each other. */
 static void self_contacts(void) {
     const double vertices[3 * 24] = {
@@ -1395,6 +1475,9 @@ int main(int count, char **arguments) {
     lists();
     overlaps();
     signed_distances();
+    for (int32_t choices = 0; choices < 4; choices++) {
+        signed_distances_of_scenes(choices & 1, choices >> 1);
+    }
     clashes();
     self_contacts();
     open_edges();

@@ -116,6 +116,7 @@ static void *ask(void *parallel) {
         cbvh_closest_point closest;
         cbvh_ray_hit hit;
         cbvh_scene_distance_answer nearest;
+        cbvh_scene_signed_distance_answer least;
         size_t count;
         for (int k = 0; k < 4; k++) {
             poses[k] = random_pose(&source, 1.5);
@@ -130,6 +131,7 @@ static void *ask(void *parallel) {
         const cbvh_ray ray = {{0, 0, 5}, {0.01, 0.02, -1}, INFINITY};
         OK(cbvh_first_hits(querier, other, NULL, &ray, 1, &hit));
         OK(cbvh_scene_distance(scene, &nearest));
+        OK(cbvh_scene_signed_distance(scene, NULL, &least));
         OK(cbvh_scene_motion(scene, &instance, &path, 1, NULL, &motion));
         OK(cbvh_scene_is_free(scene, &instance, &path, 1, NULL, answer));
     }
@@ -159,12 +161,14 @@ static void *ask(void *parallel) {
     OK(cbvh_distances(querier, padded, other, &start, 1, NULL, &apart));
     cbvh_robot robot;
     cbvh_robot_distance_answer near_robot[2];
+    cbvh_robot_signed_distance_answer deep_robot[2];
     cbvh_robot_motion_answer motion_of_robot;
     const double zeros[8] = {0}, ends[4] = {3, 2, 2.5, 1};
     OK(cbvh_robot_from_urdf(urdf, NULL, &robot));
     OK(cbvh_robot_set_parallel(robot, cores));
     OK(cbvh_robot_add_obstacle(robot, "obstacle", other, &near, NULL));
     OK(cbvh_robot_distances(robot, zeros, 4, 2, near_robot));
+    OK(cbvh_robot_signed_distances(robot, zeros, 4, 2, NULL, deep_robot));
     OK(cbvh_robot_edge_motions(robot, zeros, ends, 4, 1, NULL, &motion_of_robot));
     OK(cbvh_robot_free(robot));
     OK(cbvh_mesh_free(cylinder));

@@ -562,6 +562,19 @@ static void scenes(void) {
     FAILS(cbvh_scene_instance_pose(scene, none, &rounded), CBVH_NOT_FOUND, "instance");
     FAILS(cbvh_scene_find(scene, "two", &found), CBVH_NOT_FOUND,
           "name: expected the name of an instance, found \"two\"");
+    cbvh_scene_signed_distance_answer number;
+    const double wrong[] = {NAN, -1, INFINITY, -0x1p-1074};
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = wrong[k]},
+                                       tolerance = {.size = sizeof tolerance, .tolerance = wrong[k]};
+        FAILS(cbvh_scene_signed_distance(scene, &gap, &number), CBVH_INVALID_ARGUMENT, "relative_gap: expected");
+        FAILS(cbvh_scene_signed_distance(scene, &tolerance, &number), CBVH_INVALID_ARGUMENT, "tolerance: expected");
+    }
+    const cbvh_penetration_options cut = {.size = 12};
+    const cbvh_scene no_scene = {0};
+    FAILS(cbvh_scene_signed_distance(scene, &cut, &number), CBVH_INVALID_ARGUMENT, "options.size: expected 24");
+    FAILS(cbvh_scene_signed_distance(scene, NULL, NULL), CBVH_INVALID_ARGUMENT, "answer: expected a pointer, found NULL");
+    FAILS(cbvh_scene_signed_distance(no_scene, NULL, &number), CBVH_INVALID_HANDLE, "scene: ");
     cbvh_motion_answer answer;
     FAILS(cbvh_scene_motion(scene, &none, &path, 1, NULL, &answer), CBVH_NOT_FOUND, "instance");
     const cbvh_instance twice[3] = {instance, none, instance};

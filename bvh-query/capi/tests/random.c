@@ -232,7 +232,7 @@ int main(int argument_count, char **arguments) {
         case 49: status = cbvh_scene_instances(s, out, capacity, &count); break;
         case 50: status = cbvh_scene_pairs_within(s, x, out, capacity, &count); break;
         case 51: status = cbvh_scene_contacts(s, out, capacity, &count); break;
-        case 52: status = cbvh_scene_distance(s, out); break;
+        case 52: status = below(2) ? cbvh_scene_distance(s, out) : cbvh_scene_signed_distance(s, options, out); break;
         case 53: status = cbvh_scene_motion(s, instances, paths, below(3), options, out); break;
         case 54: status = cbvh_scene_first_hits(s, in, n, out); break;
         case 55: status = cbvh_scene_signed_point_distances(s, in, n, x, out); break;
@@ -293,7 +293,8 @@ int main(int argument_count, char **arguments) {
                                     : cbvh_robot_distances(o, in, joint_count, n, out); break;
         case 109: status = cbvh_robot_pairs_in_contact(o, in, joint_count, n, below(2) ? NULL : counts, out, capacity,
             &count); break;
-        case 110: status = cbvh_robot_link_poses(o, in, joint_count, n, out, capacity, &count); break;
+        case 110: status = below(2) ? cbvh_robot_link_poses(o, in, joint_count, n, out, capacity, &count)
+                                    : cbvh_robot_signed_distances(o, in, joint_count, n, options, out); break;
         case 111: status = below(2) ? cbvh_robot_edges_are_free(o, in, more, joint_count, n, options, out)
                                     : cbvh_robot_edge_motions(o, more, in, joint_count, n, options, out); break;
         case 112: status = below(2) ? cbvh_robot_are_free(o, in, below(4), joint_count, n, options, out)

@@ -160,6 +160,9 @@ static void description(void) {
     OK(cbvh_robot_from_urdf(urdf(), &visual, &other));
     OK(cbvh_robot_distances(other, zeros, JOINTS, 1, &nearest));
     CHECK(!nearest.found && isnan(nearest.nearest.distance) && nearest.pair.a.id == 0);
+    cbvh_robot_signed_distance_answer number;
+    OK(cbvh_robot_signed_distances(other, zeros, JOINTS, 1, NULL, &number));
+    CHECK(!number.found && isnan(number.nearest.lower) && number.pair.a.id == 0 && !number.nearest.is_signed);
     OK(cbvh_robot_free(other));
 }
 
@@ -188,6 +191,7 @@ static void configurations(int32_t parallel) {
     static cbvh_pose poses[ROWS * LINKS];
     static bool touching[ROWS];
     static cbvh_robot_distance_answer nearest[ROWS];
+    static cbvh_robot_signed_distance_answer numbers[ROWS];
     static cbvh_body_pair contacts[ROWS * PAIRS];
     size_t counts[ROWS], count, pair_count, hits = 0, place = 0;
     cbvh_querier querier;
@@ -213,10 +217,12 @@ static void configurations(int32_t parallel) {
     CHECK(pair_count == ROWS * LINKS);
     OK(cbvh_robot_collide(robot, joints, JOINTS, ROWS, touching));
     OK(cbvh_robot_distances(robot, joints, JOINTS, ROWS, nearest));
+    OK(cbvh_robot_signed_distances(robot, joints, JOINTS, ROWS, NULL, numbers));
     OK(cbvh_robot_pairs_in_contact(robot, joints, JOINTS, ROWS, counts, contacts, ROWS * PAIRS, &pair_count));
     for (size_t row = 0; row < ROWS; row++) {
-        double least = INFINITY;
+        double least = INFINITY, deepest = INFINITY;
         const size_t first = place;
+        bool is_named = false;
         for (size_t k = 0; k < count; k++) {
             cbvh_pose worlds[2], pose;
             cbvh_mesh pair[2];
@@ -244,6 +250,11 @@ static void configurations(int32_t parallel) {
                 place++;
             }
             least = fmin(least, distance.distance);
+            cbvh_signed_distance number;
+            OK(cbvh_signed_distances(querier, pair[0], pair[1], &pose, 1, NULL, &number));
+            deepest = fmin(deepest, number.lower);
+            is_named |= numbers[row].pair.a.id == both[0].id && numbers[row].pair.b.id == both[1].id &&
+                        fabs(number.lower - numbers[row].nearest.lower) < 1e-9;
         }
         CHECK(place - first == counts[row] && touching[row] == (place > first));
         CHECK(nearest[row].found && fabs(nearest[row].nearest.distance - least) < 1e-12);
@@ -251,6 +262,19 @@ static void configurations(int32_t parallel) {
         const double way = sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
         CHECK(fabs(way - least) < 1e-9 && fabs(a[2]) < 2 && fabs(b[2]) < 2);
         hits += touching[row];
+        /* The points are in the world, and as far apart along the normal as the number says. */
+        const cbvh_signed_distance *const of = &numbers[row].nearest;
+        double apart = 0, length = 0;
+        for (int axis = 0; axis < 3; axis++) {
+            apart += of->normal[axis] * (of->point_b[axis] - of->point_a[axis]);
+            length += of->translation[axis] * of->translation[axis];
+        }
+        CHECK(numbers[row].found && is_named && of->is_signed && fabs(of->lower - deepest) < 1e-9);
+        CHECK(fabs(apart - deepest) < 1e-9 + 0.02 * fabs(deepest) && fabs(of->point_a[2]) < 2);
+        CHECK(fabs(sqrt(length) - fmax(0, -of->lower)) < 1e-12);
+        cbvh_robot_signed_distance_answer alone;
+        OK(cbvh_robot_signed_distances(robot, &joints[row * JOINTS], JOINTS, 1, NULL, &alone));
+        CHECK(memcmp(&alone, &numbers[row], sizeof alone) == 0);
     }
     CHECK(place == pair_count && hits > 15 && hits < ROWS - 15);
     FAILS(cbvh_robot_pairs_in_contact(robot, joints, JOINTS, ROWS, NULL, NULL, 0, &count), CBVH_BUFFER_TOO_SMALL, "pairs");
@@ -259,6 +283,7 @@ static void configurations(int32_t parallel) {
     CHECK(count == 2 * LINKS);
     /* None at all. */
     OK(cbvh_robot_collide(robot, NULL, JOINTS, 0, NULL));
+    OK(cbvh_robot_signed_distances(robot, NULL, JOINTS, 0, NULL, NULL));
     OK(cbvh_robot_link_poses(robot, NULL, JOINTS, 0, NULL, 0, &count));
     CHECK(count == 0);
     for (int k = 0; k < BODIES; k++) {
@@ -577,6 +602,7 @@ static void misuse(void) {
     cbvh_body_pair pairs[9];
     cbvh_pose pose = CBVH_IDENTITY;
     cbvh_robot_distance_answer nearest[3];
+    cbvh_robot_signed_distance_answer numbers[3];
     cbvh_robot_motion_answer motion[3];
     cbvh_robot_counts sizes;
     cbvh_frequent_pair pairs_of_many[1];
@@ -692,6 +718,7 @@ static void misuse(void) {
         const char *const message = "joints[2]: joint shoulder: expected a finite value, found NaN";
         FAILS(cbvh_robot_collide(robot, joints, JOINTS, 3, answers), CBVH_INVALID_ARGUMENT, message);
         FAILS(cbvh_robot_distances(robot, joints, JOINTS, 3, nearest), CBVH_INVALID_ARGUMENT, message);
+        FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, NULL, numbers), CBVH_INVALID_ARGUMENT, message);
         FAILS(cbvh_robot_pairs_in_contact(robot, joints, JOINTS, 3, counts, pairs, 9, &count), CBVH_INVALID_ARGUMENT, message);
         FAILS(cbvh_robot_link_poses(robot, joints, JOINTS, 3, NULL, 0, &count), CBVH_INVALID_ARGUMENT, message);
         joints[2 * JOINTS + 1] = 0;
@@ -705,6 +732,20 @@ static void misuse(void) {
         FAILS(cbvh_robot_edges_are_free(robot, joints, joints, JOINTS, 3, &bad, answers), CBVH_INVALID_ARGUMENT, "clearance");
         FAILS(cbvh_robot_edge_motions(robot, joints, joints, JOINTS, 3, &small, motion), CBVH_INVALID_ARGUMENT,
               "options.size: expected 24");
+        for (size_t k = 0; k < 3; k++) {
+            const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = margins[k]},
+                                           tolerance = {.size = sizeof tolerance, .tolerance = margins[k]};
+            /* Also where no configuration is asked about. */
+            FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, k, &gap, numbers), CBVH_INVALID_ARGUMENT,
+                  "relative_gap: expected");
+            FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, &tolerance, numbers), CBVH_INVALID_ARGUMENT,
+                  "tolerance: expected");
+        }
+        const cbvh_penetration_options cut = {.size = 12};
+        FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, &cut, numbers), CBVH_INVALID_ARGUMENT,
+              "options.size: expected 24");
+        FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, NULL, NULL), CBVH_INVALID_ARGUMENT, "answers: ");
+        FAILS(cbvh_robot_signed_distances(none, joints, JOINTS, 3, NULL, numbers), CBVH_INVALID_HANDLE, "robot: ");
     }
     FAILS(cbvh_robot_edges_are_free(robot, joints, NULL, JOINTS, 1, NULL, answers), CBVH_INVALID_ARGUMENT, "ends: ");
     FAILS(cbvh_robot_edges_are_free(robot, joints, joints, 5, 1, NULL, answers), CBVH_INVALID_ARGUMENT, "joint_count: ");

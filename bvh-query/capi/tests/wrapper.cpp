@@ -202,6 +202,10 @@ void overlaps() {
     cbvh::Scene scene;
     scene.add(one, {});
     scene.add(one, corner);
+    const auto deepest = scene.signed_distance();
+    CHECK(deepest->nearest.lower <= -0.25 && deepest->nearest.upper >= -0.25 && deepest->nearest.is_signed);
+    CHECK(scene.signed_distance({0, 0.1})->nearest.upper < -0.1 && !cbvh::Scene().signed_distance());
+    FAILS(scene.signed_distance({-1}), CBVH_INVALID_ARGUMENT, "relative_gap: ");
     const auto clashes = scene.clashes(near);
     CHECK(clashes.size() == 1 && clashes[0].clash.kind == CBVH_CLASH_OVERLAPPING && scene.clashes().size() == 1);
     FAILS(scene.clashes({0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
@@ -454,6 +458,11 @@ void robots(const std::string &urdf) {
         const auto distances = robot.distance(both);
         CHECK(distances[0]->nearest.distance > 0 && distances[1]->nearest.distance == 0);
         CHECK(robot.distance(up)->nearest.distance == distances[0]->nearest.distance);
+        const auto numbers = robot.signed_distance(both);
+        CHECK(numbers[0]->nearest.lower > 0 && numbers[1]->nearest.upper < 0 && robot.signed_distance(std::vector<Joints>()).empty());
+        CHECK(std::abs(numbers[0]->nearest.upper - distances[0]->nearest.distance) < 1e-12);
+        CHECK(robot.signed_distance(forward)->nearest.lower == numbers[1]->nearest.lower && numbers[1]->pair.b == box);
+        FAILS(robot.signed_distance(up, {0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
         const auto pairs = robot.pairs_in_contact(both);
         CHECK(pairs[0].empty() && !pairs[1].empty() && pairs[1].size() == robot.pairs_in_contact(forward).size());
         CHECK(robot.link_poses(both)[1][4].rows[3] == robot.link_poses(forward)[4].rows[3] && robot.link_poses(up).size() == 5);

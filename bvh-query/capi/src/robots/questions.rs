@@ -6,10 +6,11 @@ use crate::input::{self, each, reserve};
 use crate::output::{List, Lists, Room};
 use crate::status::Failure;
 use crate::types::{
-    BodyPairRow, FREE, HIT, MotionChoices, NEAR, PoseRows, RobotDistanceRow, RobotHandle, RobotMotionRow,
+    BodyPairRow, FREE, HIT, MotionChoices, NEAR, PenetrationChoices, PoseRows, RobotDistanceRow, RobotHandle,
+    RobotMotionRow, RobotSignedDistanceRow,
 };
 use bvh_query::MotionOptions;
-use cbvh_robot::{Edge, Robot, RobotDistance, RobotError, RobotMotion};
+use cbvh_robot::{Edge, Robot, RobotDistance, RobotError, RobotMotion, RobotSignedDistance};
 
 /// Configurations, or other rows of numbers that a robot is asked about.
 struct Rows {
@@ -102,6 +103,26 @@ impl Configurations {
     ///
     /// # Safety
     /// As for `array` and `Room::new`.
+    unsafe fn answer<T, R: Copy>(
+        self,
+        answers: *mut R,
+        one: impl Fn(&mut Robot, &[f64]) -> Result<T, RobotError>,
+        all: impl FnOnce(&mut Robot, &[f64]) -> Result<Vec<T>, RobotError>,
+        row: impl Fn(&Robot, T) -> R,
+    ) -> Result<(), Failure> {
+        // SAFETY: the caller vouches for it.
+        unsafe {
+            let room = || Room::new("answers", answers, self.1.count);
+            self.ask(room, one, all, |mut room, own, found| {
+                room.fill(found.into_iter().map(Ok::<_, Failure>), |found| row(own, found))
+            })
+        }
+    }
+
+    /// Asks for an answer about each, as a function of the interface.
+    ///
+    /// # Safety
+    /// As for `array` and `Room::new`.
     unsafe fn each<T, R: Copy>(
         self,
         answers: *mut R,
@@ -110,12 +131,7 @@ impl Configurations {
         row: impl Fn(&Robot, T) -> R,
     ) -> i32 {
         // SAFETY: the caller vouches for it.
-        entry(|| unsafe {
-            let room = || Room::new("answers", answers, self.1.count);
-            self.ask(room, one, all, |mut room, own, found| {
-                room.fill(found.into_iter().map(Ok::<_, Failure>), |found| row(own, found))
-            })
-        })
+        entry(|| unsafe { self.answer(answers, one, all, row) })
     }
 }
 
@@ -140,6 +156,35 @@ fn distance(robot: &Robot, of: Option<RobotDistance>) -> RobotDistanceRow {
     };
     (nearest.point_a, nearest.point_b) = (point_a, point_b);
     RobotDistanceRow { pair: numbered(robot, &bodies), nearest: nearest.into(), found: 1, reserved: 0 }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_robot_signed_distances(
+    robot: RobotHandle,
+    joints: *const f64,
+    joint_count: usize,
+    count: usize,
+    options: *const PenetrationChoices,
+    answers: *mut RobotSignedDistanceRow,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let options = input::options("options", options)?.read();
+        // No configuration is to blame for them.
+        options.check()?;
+        configurations(robot, joints, joint_count, count).answer(
+            answers,
+            |robot, joints| robot.signed_distance(joints, &options),
+            |robot, joints| robot.signed_distance_many(joints, &options),
+            signed_distance,
+        )
+    })
+}
+
+/// Makes the row of the bodies with the least signed distance.
+fn signed_distance(robot: &Robot, of: Option<RobotSignedDistance>) -> RobotSignedDistanceRow {
+    let Some(RobotSignedDistance { bodies, nearest, .. }) = of else { return input::Plain::NONE };
+    RobotSignedDistanceRow { pair: numbered(robot, &bodies), nearest: nearest.into(), found: 1, reserved: 0 }
 }
 
 /// Room for a list of pairs of bodies for each configuration.

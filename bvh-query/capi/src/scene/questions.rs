@@ -7,8 +7,8 @@ use crate::output::One;
 use crate::paths::AskedPath;
 use crate::status::Failure;
 use crate::types::{
-    ClashChoices, Instance, MotionChoices, MotionRow, PairRow, PathHandle, SceneClashRow, SceneContactRow,
-    SceneDistanceRow, SceneHandle, SceneRelationRow,
+    ClashChoices, Instance, MotionChoices, MotionRow, PairRow, PathHandle, PenetrationChoices, SceneClashRow,
+    SceneContactRow, SceneDistanceRow, SceneHandle, SceneRelationRow, SceneSignedDistanceRow,
 };
 use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 
@@ -17,6 +17,8 @@ about! {
     one cbvh_scene_collide() -> answer: bool = scene.collide()?;
     one cbvh_scene_within(d: f64,) -> answer: bool = scene.within(d)?;
     one cbvh_scene_distance() -> answer: SceneDistanceRow = scene.distance()?.into();
+    one cbvh_scene_signed_distance(options: *const PenetrationChoices,) -> answer: SceneSignedDistanceRow =
+        scene.signed_distance(&input::options("options", options)?.read())?.into();
     list cbvh_scene_pairs_in_contact() -> pairs: PairRow = scene.pairs_in_contact()?;
     list cbvh_scene_pairs_within(d: f64,) -> pairs: PairRow = scene.pairs_within(d)?;
     list cbvh_scene_relations() -> relations: SceneRelationRow = scene.relations()?;
