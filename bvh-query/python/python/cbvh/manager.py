@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _cbvh
-from ._answers import Distance, Floats
+from ._answers import Floats
 from ._baking import bake
 from ._mesh import Mesh, _length
 from ._poses import relative
@@ -472,15 +472,15 @@ class CollisionManager:
         a, b, found = least
         distance = found.distance
         if distance == 0:
-            pairs = scene.pairs_in_contact().tolist()
-            pairs = [pair for pair in pairs if all(self._geometry_of(one, own, others).has_inside for one in pair)]
-            if pairs:
-                depth = scene.penetrations(pairs, relative_gap=_GAP).depth
-                # Where they only touch, the translation is some roundings long.
-                depths = np.where(depth.lower > 0, depth.upper, 0.0)
-                a, b = pairs[int(np.argmax(depths))]
-                distance = 0.0 - float(np.max(depths))
-                found = Distance(*(part[0] for part in scene.distances([[a, b]]).nearest))
+            for pair in scene.pairs_in_contact().tolist():
+                of_a, of_b = (self._geometry_of(one, own, others) for one in pair)
+                if of_a.has_inside and of_b.has_inside:
+                    at = relative(*scene.poses(pair))
+                    number = of_a.mesh.signed_distance(of_b.mesh, at, relative_gap=_GAP)
+                    # Where they only touch, the translation is some roundings long, and 0 is between the bounds.
+                    if number.upper < 0 and number.lower < distance:
+                        (a, b), distance = pair, number.lower
+                        found = of_a.mesh.distance(of_b.mesh, at)
         pose = scene.pose(a)
         names, is_swapped = _ordered(a, b, own, others)
         points = [pose[:3, :3] @ point + pose[:3, 3] for point in (found.point_a, found.point_b)]
