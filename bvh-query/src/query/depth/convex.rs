@@ -5,6 +5,7 @@ use crate::file::shape::Shape;
 use crate::narrow::{ConvexSolid, Enclosed, Point, dot, subtract};
 use crate::numerics::UNIT_ROUNDOFF;
 use crate::pose::Pose;
+use crate::query::depth::penetration::PenetrationOptions;
 use crate::query::depth::polytope::{Corner, Face, Polytope};
 use crate::query::depth::translation::{Translation, length_above};
 use crate::query::querier::Querier;
@@ -57,7 +58,7 @@ impl Solids<'_> {
 
 impl Querier {
     /// Returns the depth of two shapes if their cores are convex solids that certainly overlap; none if they are not, or where
-    /// roundings matter too much. The search ends as soon as both bounds are enough.
+    /// roundings matter too much. The search ends as soon as both bounds are enough for the options.
     ///
     /// The surface of the placed B is within what placing it rounds of a convex one. Scaled about a centre so that it keeps as far
     /// inside of that as the surface may come, B is certainly convex; that takes the same part of its reach as of the ball inside.
@@ -66,7 +67,7 @@ impl Querier {
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-        is_enough: impl Fn(f64, f64) -> bool,
+        options: &PenetrationOptions,
     ) -> Result<Option<ConvexDepth>, QueryError> {
         let (Some(of_a), Some(of_b)) = (core(a)?, core(b)?) else { return Ok(None) };
         let line = Translation::new(a, b, pose);
@@ -93,7 +94,7 @@ impl Querier {
             }
             let upper = height.min(known) + line.radii;
             let lower = face.distance + line.radii;
-            if face.distance > 0.0 && is_enough(lower - bent, upper + bent) {
+            if face.distance > 0.0 && options.is_enough(lower - bent, upper + bent) {
                 break;
             }
             if self.memory.budget.visit().is_err() {

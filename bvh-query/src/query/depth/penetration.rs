@@ -162,7 +162,7 @@ impl Querier {
         let (a, b) = (a.into(), b.into());
         self.start();
         check_closed(a, b)?;
-        if let Some(found) = self.convex_depth(a, b, pose, |lower, upper| options.is_enough(lower, upper))? {
+        if let Some(found) = self.convex_depth(a, b, pose, options)? {
             return Ok(found.into());
         }
         if self.relation_of(a, b, pose)? == Relation::Apart {
@@ -179,7 +179,7 @@ impl Querier {
         pose: &Pose,
         options: &PenetrationOptions,
     ) -> Result<Penetration, QueryError> {
-        match self.convex_depth(a, b, pose, |lower, upper| options.is_enough(lower, upper))? {
+        match self.convex_depth(a, b, pose, options)? {
             Some(found) => Ok(found.into()),
             None => self.search_depth(a, b, pose, options),
         }

@@ -89,9 +89,7 @@ impl Querier {
         options.check()?;
         let (a, b) = (a.into(), b.into());
         self.start();
-        self.signed_given(a, b, pose, options, |querier| {
-            querier.distance_between(a, b, pose, &DistanceOptions::default())
-        })
+        self.signed_by(None, [a, b], pose, options)
     }
 
     /// Returns the signed distance of two shapes, unless they are apart.
@@ -106,27 +104,25 @@ impl Querier {
         if self.relation_of(a, b, pose)? == Relation::Apart {
             return Ok(None);
         }
-        let distance = |querier: &mut Self| querier.distance_between(a, b, pose, &DistanceOptions::default());
-        self.signed_given(a, b, pose, options, distance).map(Some)
+        self.signed_by(None, [a, b], pose, options).map(Some)
     }
 
-    /// Returns the signed distance, given what finds the distance.
-    fn signed_given(
+    /// Returns the signed distance. A tracker finds the distance, if there is one.
+    fn signed_by(
         &mut self,
-        a: Shape<'_>,
-        b: Shape<'_>,
+        tracker: Option<&mut Tracker>,
+        [a, b]: [Shape<'_>; 2],
         pose: &Pose,
         options: &PenetrationOptions,
-        distance: impl FnOnce(&mut Self) -> Result<Distance, QueryError>,
     ) -> Result<SignedDistance, QueryError> {
         let is_signed = has_inside(a)? && has_inside(b)?;
-        if is_signed
-            && let Some(found) =
-                self.convex_depth(a, b, pose, |lower, upper| options.is_enough(lower, upper))?
-        {
+        if is_signed && let Some(found) = self.convex_depth(a, b, pose, options)? {
             return Ok(SignedDistance::deep(&found.into(), found.points));
         }
-        let found = distance(self)?;
+        let found = match tracker {
+            Some(tracker) => tracker.distance_between(self, a, b, pose),
+            None => self.distance_between(a, b, pose, &DistanceOptions::default()),
+        }?;
         if !is_signed {
             return Ok(SignedDistance::apart(&found, false));
         }
@@ -163,6 +159,6 @@ impl Tracker {
         options.check()?;
         let (a, b) = (a.into(), b.into());
         querier.start();
-        querier.signed_given(a, b, pose, options, |querier| self.distance_between(querier, a, b, pose))
+        querier.signed_by(Some(self), [a, b], pose, options)
     }
 }
