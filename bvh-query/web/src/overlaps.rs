@@ -26,7 +26,7 @@ pub fn separation(a: &Mesh, b: &Mesh, poses: &Float64Array, directions: &Float64
 }
 
 /// Reads when the search for a depth ends.
-fn depth_options(relative_gap: Option<f64>, tolerance: Option<f64>) -> PenetrationOptions {
+pub(crate) fn depth_options(relative_gap: Option<f64>, tolerance: Option<f64>) -> PenetrationOptions {
     let mut options = PenetrationOptions::new();
     options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
     options.tolerance = tolerance;

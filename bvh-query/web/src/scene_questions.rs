@@ -1,9 +1,11 @@
 //! Questions about all instances of a scene: about pairs, at rest and in motion, and about probes in the world.
 
-use crate::answers::{clashes, closest_row, contacts, distances, floats, found, hit_row, ids, small};
+use crate::answers::{
+    clashes, closest_row, contacts, distances, floats, found, hit_row, ids, signed_distances, small,
+};
 use crate::arguments::{Answer, integers, refused, rows, same_count, with_querier, wrong};
 use crate::motions::{FREE, HIT, NEAR, options};
-use crate::overlaps::clash_options;
+use crate::overlaps::{clash_options, depth_options};
 use crate::paths;
 use crate::probes::{Rays, segments};
 use crate::scene::{Scene, beside};
@@ -91,6 +93,14 @@ impl Scene {
         let nearest = self.ask(|scene| scene.distance())?;
         let pair = nearest.iter().map(|found| self.pair(found.pair));
         Ok(beside(pair, distances(&[nearest.map(|found| found.nearest)]).into()))
+    }
+
+    /// The pair with the least signed distance, if there are pairs, and the parts of that.
+    #[wasm_bindgen(js_name = signedDistance)]
+    pub fn signed_distance(&mut self, relative_gap: Option<f64>, tolerance: Option<f64>) -> Answer<Array> {
+        let least = self.ask(|scene| scene.signed_distance(&depth_options(relative_gap, tolerance)))?;
+        let pair = least.iter().map(|found| self.pair(found.pair));
+        Ok(beside(pair, signed_distances(least.map(|found| found.nearest).as_slice()).into()))
     }
 
     /// The distances of pairs of instances.

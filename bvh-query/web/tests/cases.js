@@ -72,6 +72,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.validate(),
         () => cbvh.nearestPose(pose),
         () => scene((made) => [made.collide(), made.pairsInContact(), made.pairsWithin(x), made.within(y)]),
+        () => scene((made) => [made.signedDistance({ relativeGap: x, tolerance: y })]),
         () => scene((made) => [made.distance(), made.relations(), made.contacts(), made.distances(["a", "b"])]),
         () => scene((made) => made.clashes({ clearance: x, tolerance: y })),
         () => scene((made) => made.motion(new Map([["b", screw()]]), { clearance: x })),
@@ -248,6 +249,42 @@ export const cases = {
             equal([found.isSigned, translation.every((by) => by === 0)], [isSigned, expected >= 0]);
         }
         equal(cube.signedDistanceEach(cube, []).isSigned, []);
+    },
+
+    "a scene has the least signed distance of its pairs": (cbvh) => {
+        const { box, Mesh, Scene } = cbvh;
+        const scene = new Scene();
+        equal(scene.signedDistance(), undefined);
+        // A block passes through a large one, and a third one is always 0.75 from that.
+        const [large, small] = [box([2, 4, 4]), box([1, 1, 1])];
+        const [a, b, c] = [scene.add(large), scene.add(small), scene.add(small, at(0, -3.25, 0))];
+        for (let x = -3; x <= 3; x += 0.125) {
+            scene.setPose(b, at(x, 0.25, 0));
+            for (const options of [{}, { relativeGap: 1e-6 }, { tolerance: 0.25 }]) {
+                const found = scene.signedDistance(options);
+                const [{ lower, upper }, expected] = [found.nearest, Math.min(Math.abs(x) - 1.5, 0.75)];
+                ok(lower <= expected && expected <= upper, `bounds around ${expected}, found ${lower} and ${upper}`);
+                ok(Math.abs(x) === 2.25 || (found.a === a && found.b === (Math.abs(x) < 2.25 ? b : c)), `the pair at ${x}`);
+                if (Math.abs(x) < 2.25) {
+                    equal(found.nearest, large.signedDistance(small, at(x, 0.25, 0), options));
+                }
+            }
+        }
+        // What is not closed has no depth, and its number is 0 where it touches.
+        scene.setPose(b, at(1, 0.25, 0));
+        scene.setMesh(b, Mesh.bake(CUBE, CUBE_FACES.slice(3)));
+        const { nearest, ...pair } = scene.signedDistance();
+        equal([pair, nearest.lower, nearest.upper, nearest.isSigned], [{ a, b }, 0, 0, false]);
+        // Of all pairs of other meshes it is the least.
+        const places = [at(0, 0, 0), at(1.5, 0.25, 0), at(3.25, 0.125, 0.5), at(9, 0, 0), at(9, 0.5, 0.25)];
+        const meshes = places.map((_, k) => (k % 2 ? pairOf(cbvh) : cubeOf(cbvh)));
+        const other = new Scene();
+        places.forEach((place, k) => other.add(meshes[k], place));
+        const numbers = places.flatMap((to, j) =>
+            places.slice(0, j).map((from, i) => meshes[i].signedDistance(meshes[j], cbvh.relative(from, to)).lower),
+        );
+        equal(other.signedDistance().nearest.lower, Math.min(...numbers));
+        ok(Math.min(...numbers) < -0.5 && Math.max(...numbers) > 0.5, "pairs that overlap and others");
     },
 
     "parts clash as their gap and their depth say": (cbvh) => {
@@ -784,6 +821,9 @@ export const cases = {
                 "visits: expected a whole number from 0 to 2^32 - 1, found 0.5",
             ],
             [() => cube.clash(gone, at(0, 0, 0)), "other: expected a Mesh in use, found one that was freed"],
+            [() => scene.signedDistance({ relativeGap: 0 }), /^relative_gap: expected a finite part above 0/],
+            [() => scene.signedDistance({ tolerance: "1" }), "tolerance: expected a number, found a string"],
+            [() => new cbvh.Scene().signedDistance({ tolerance: -1 }), /^tolerance: expected a finite depth of at least 0/],
             [() => new cbvh.Scene().clashes({ tolerance: -1 }), /^tolerance: expected a finite depth of at least 0/],
             [() => cube.patches(cube, at(0, 0, 0), { tolerance: NaN }), /^tolerance: expected/],
             [

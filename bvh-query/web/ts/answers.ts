@@ -432,6 +432,16 @@ export interface SceneDistance {
     nearest: Distance;
 }
 
+/** The pair of instances with the least signed distance. */
+export interface SceneSignedDistance {
+    /** The number of the instance in whose frame points, normal and translation are given. */
+    a: number;
+    /** The number of the other instance. */
+    b: number;
+    /** The answer of `Mesh.signedDistance`. */
+    nearest: SignedDistance;
+}
+
 /** Whether the paths of instances are free. */
 export interface SceneMotionAnswer {
     kind: MotionKind;

@@ -27,6 +27,7 @@ export type {
     SceneMotionAnswer,
     SceneRayHits,
     SceneRelations,
+    SceneSignedDistance,
     SelfContacts,
     Separation,
     Separations,

@@ -164,7 +164,7 @@ export function limits(options: MotionOptions): [number, number | undefined] {
 }
 
 /** Reads when the search for a depth ends. */
-function depthLimits(options: PenetrationOptions): [number?, number?] {
+export function depthLimits(options: PenetrationOptions): [number?, number?] {
     return [optional(options.relativeGap, "relativeGap"), optional(options.tolerance, "tolerance")];
 }
 

@@ -10,6 +10,7 @@ import type {
     SceneMotionAnswer,
     SceneRayHits,
     SceneRelations,
+    SceneSignedDistance,
 } from "./answers.js";
 import {
     bytes,
@@ -25,7 +26,17 @@ import {
     type Integers,
     type Numbers,
 } from "./arguments.js";
-import { clashLimits, limits, Mesh, onePose, untils, type ClashOptions, type MotionOptions } from "./mesh.js";
+import {
+    clashLimits,
+    depthLimits,
+    limits,
+    Mesh,
+    onePose,
+    untils,
+    type ClashOptions,
+    type MotionOptions,
+    type PenetrationOptions,
+} from "./mesh.js";
 import { call, Handle, raw } from "./module.js";
 import { Motion, onePath } from "./motion.js";
 
@@ -291,6 +302,23 @@ export class Scene extends Handle<raw.Scene> {
     distance(): SceneDistance | undefined {
         const [pair, nearest] = this.#call((scene) => scene.distance());
         return pairOf(pair as Uint32Array, nearest as unknown[]);
+    }
+
+    /**
+     * The pair that overlaps most, by its lower bound, or else the nearest pair, and its signed distance: the distance, or minus the
+     * depth. `undefined` if there are no pairs. A pair of which one is inside the other overlaps, if both are closed. The signed
+     * distance of every other pair is at least that lower bound, but for roundings of distances. The options are those of
+     * `Mesh.signedDistance`. It takes the time of `relations`, and of a depth for each pair that overlaps; where none does, that of
+     * `distance`.
+     */
+    signedDistance(options: PenetrationOptions = {}): SceneSignedDistance | undefined {
+        const limits = depthLimits(options);
+        const [pair, nearest] = this.#call((scene) => scene.signedDistance(...limits));
+        const [a, b] = pair as Uint32Array;
+        if (a === undefined || b === undefined) {
+            return undefined;
+        }
+        return { a, b, nearest: answers.onlySignedDistance(answers.signedDistances(nearest as unknown[])) };
     }
 
     /**
