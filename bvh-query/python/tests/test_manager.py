@@ -157,6 +157,24 @@ class Manager(unittest.TestCase):
         self.assertAlmostEqual(manager.min_distance_single(solid(), shifts((0.5, 0, 0))[0]), -0.5, places=9)
         self.assertEqual(manager.min_distance_single(solid(), shifts((-1, 0, 0))[0]), 0.0)
 
+    def test_distances_are_negative_only_where_surfaces_touch_and_insides_meet(self):
+        flat, (corners, faces) = solid(2), cube()
+        flat.vertices = flat.vertices * [1, 1, 0]
+        bare, opened = cbvh.bake(corners, faces, topology=False), cbvh.bake(corners, faces[:-1])
+        for other in (flat, bare, opened):
+            for turn in (np.eye(4), random_poses(12, 1, 0)[0]):
+                manager = cbvh.CollisionManager()
+                manager.add_object("cube", solid())
+                at = shifts((0.25, 0.375, 0.125))[0] @ turn
+                self.assertEqual(manager.min_distance_single(other, at, return_name=True), (0.0, "cube"))
+                # Two cubes overlap a little. All are inside a shell, which none of them touches.
+                manager.add_object("other", other, at)
+                manager.add_object("next", solid(), shifts((0, 0, 0.875))[0])
+                manager.add_object("shell", solid(20.0))
+                distance, names = manager.min_distance_internal(return_names=True)
+                self.assertEqual(names, ("cube", "next"))
+                self.assertAlmostEqual(distance, -0.125, places=9)
+
     def test_objects_come_go_and_move(self):
         manager = cbvh.CollisionManager()
         self.assertEqual(manager.in_collision_internal(return_names=True, return_data=True), (False, set(), []))
