@@ -15,7 +15,7 @@
 //! free because exact arithmetic says so of the pose there, and of nothing else.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
+use crate::narrow::{Point, Triangle, cross, dot, subtract, triangle_distance};
 use crate::numerics::UNIT_ROUNDOFF;
 use crate::query::depth::leaving::Leaving;
 use crate::query::depth::translation::Translation;
@@ -43,6 +43,17 @@ pub(super) struct LastContact {
     pub(super) triangles: [Triangle; 2],
 }
 
+/// How a free place on a line is looked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Search {
+    /// The first one.
+    First,
+    /// One that may be behind others which are free for a part of the way to it.
+    Rough,
+    /// The same, first about as far as this.
+    Near(f64),
+}
+
 /// The places that are tried: before a contact has certainly left, by parts of what is charged for roundings there, and after it,
 /// in errors of placing.
 const PARTS: [f64; 2] = [7.0 / 8.0, 1.0 / 2.0];
@@ -56,6 +67,15 @@ const COMMON_POINTS: u32 = 64;
 const MANY_TRIANGLES: f64 = 8.0;
 const GROWTH: f64 = 1.5;
 const FEW_CROSSINGS: f64 = 4.0;
+
+/// A guess is exceeded by this part of it.
+const SPARE: f64 = 1.0 / 4096.0;
+
+/// The steps back to a contact, and when they have reached it: when the gap is this part of the way. They are of no use where the way
+/// leads along surfaces, with less than this cosine.
+const MAX_STEPS_BACK: u32 = 8;
+const TIGHT: f64 = 1e-6;
+const LEAST_RATE: f64 = 1.0 / 16.0;
 
 /// The part of the size by which a common point has to bring a way on.
 const LEAST_PART: f64 = 2e-7;
@@ -96,30 +116,56 @@ impl Gap {
         squared.max(0.0).sqrt() - along + 16.0 * line.error
     }
 
+    /// Returns the contact of the closest points, with triangles that face each other there.
     fn contact(&self, line: &Translation<'_>, at: f64) -> LastContact {
         let back = line.translation_at(-at);
         let point_b = [0, 1, 2].map(|k| self.point_b[k] + back[k]);
-        LastContact { normal: self.normal, point: self.point_a, triangles: [[self.point_a; 3], [point_b; 3]] }
+        let axis = (0..3).fold(0, |k, j| if self.normal[j].abs() < self.normal[k].abs() { j } else { k });
+        let mut aside = [0.0; 3];
+        aside[axis] = line.size;
+        let u = cross(self.normal, aside);
+        let v = cross(self.normal, u);
+        let around = |p: Point, sign: f64| {
+            [[1.0, 0.0], [0.0, sign], [-1.0, -sign]]
+                .map(|[i, j]| [0, 1, 2].map(|k| p[k] + i * u[k] + j * v[k]))
+        };
+        LastContact {
+            normal: self.normal,
+            point: self.point_a,
+            triangles: [around(self.point_a, 1.0), around(point_b, -1.0)],
+        }
     }
 }
 
 impl Querier {
     /// Returns the first place that is found on a line, before `limit`, where interiors are certainly disjoint. They are known to
-    /// meet at all moves shorter than `from`. A rough search may pass over places that are free for a part of the way to them.
+    /// meet at all moves shorter than `from`.
     pub(super) fn free_on(
         &mut self,
         line: &Translation<'_>,
         from: f64,
         limit: f64,
-        is_rough: bool,
+        search: Search,
     ) -> Result<Option<Free>, QueryError> {
         let (mut at, mut last, mut stuck) = (from, None, 1.0);
-        let mut step = if is_rough && limit > MANY_TRIANGLES * line.grain { line.grain / 4.0 } else { 0.0 };
+        let mut step = match search {
+            Search::Near(guess) if line.radii == 0.0 && line.is_fine => {
+                (guess - from).max(0.0) * (1.0 + SPARE) + 64.0 * line.placing
+            }
+            Search::Rough | Search::Near(_) if limit > MANY_TRIANGLES * line.grain => line.grain / 4.0,
+            _ => 0.0,
+        };
         let mut least = 0.0;
         while at < limit && at <= line.length {
             while step > least && at < limit {
                 if self.relation_of(line.a, line.b, &line.pose_at(at + step))? == Relation::Apart {
+                    if let Some(free) = self.tightened(line, from, at + step)? {
+                        return Ok(Some(free));
+                    }
                     (step, least) = (step / FEW_CROSSINGS, line.grain);
+                } else if at == from && matches!(search, Search::Near(_)) && line.is_fine {
+                    // The guess was too short, but hardly so.
+                    (at, step) = (at + step, step / 16.0);
                 } else {
                     (at, step) = (at + step, step * GROWTH);
                 }
@@ -177,6 +223,38 @@ impl Querier {
             covered += way;
         }
         Ok(covered.min(end))
+    }
+
+    /// Goes back from a free place for as long as distances say that it is free there, too. Where surfaces are convex, each step ends
+    /// nearer to their contact and before it (Newton's method). Nothing if contact is not reached.
+    fn tightened(
+        &mut self,
+        line: &Translation<'_>,
+        from: f64,
+        place: f64,
+    ) -> Result<Option<Free>, QueryError> {
+        if line.radii > 0.0 || !line.is_fine {
+            return Ok(None);
+        }
+        let (mut at, mut last) = (place, None);
+        for _ in 0..MAX_STEPS_BACK {
+            let gap = self.gap_of_cores(line, at)?;
+            last = gap.as_ref().map(|gap| gap.contact(line, at)).or(last);
+            let rate = gap.as_ref().map_or(1.0, |gap| dot(gap.normal, line.direction));
+            let Some(gap) = gap.filter(|gap| gap.distance > TIGHT * at * rate) else {
+                return Ok(Some(Free { at, last }));
+            };
+            let next = at - (gap.lower - 4.0 * line.error) / rate;
+            if rate < LEAST_RATE
+                || next < from
+                || next >= at
+                || self.relation_of(line.a, line.b, &line.pose_at(next))? != Relation::Apart
+            {
+                break;
+            }
+            at = next;
+        }
+        Ok(None)
     }
 
     /// Returns where the cores are at a place, unless they touch.

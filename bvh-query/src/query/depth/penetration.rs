@@ -11,7 +11,7 @@ use crate::narrow::{Point, Triangle, cross, dot, subtract};
 use crate::pose::Pose;
 use crate::query::depth::balls::{ASCENT_STEPS, Balls, Depths, bounds};
 use crate::query::depth::convex::ConvexDepth;
-use crate::query::depth::free::{Free, LastContact};
+use crate::query::depth::free::{Free, LastContact, Search};
 use crate::query::depth::planes::{Plane, shortest_beyond};
 use crate::query::depth::translation::{Translation, length_above, moved};
 use crate::query::options::{check, options};
@@ -121,7 +121,7 @@ impl Querier {
             return Ok(Separation { lower: 0.0, upper: 0.0, translation: [0.0; 3] });
         }
         let line = Translation::new(a, b, pose).along(direction);
-        let (lower, upper) = match self.free_on(&line, 0.0, f64::INFINITY, false)? {
+        let (lower, upper) = match self.free_on(&line, 0.0, f64::INFINITY, Search::First)? {
             Some(Free { at, .. }) => (self.cover(&line, at)?, at),
             // Only in a file with forged bounds are interiors beyond boxes.
             None => (0.0, line.length),
@@ -229,6 +229,8 @@ struct DepthSearch<'a> {
     /// The shortest translation so far.
     translation: Point,
     best: f64,
+    /// Whether it is the one that takes B's box out of A's.
+    is_of_boxes: bool,
     balls: Balls,
     /// The depth of convex pieces.
     pieces: f64,
@@ -244,6 +246,7 @@ impl<'a> DepthSearch<'a> {
             options: *options,
             translation: [0.0; 3],
             best: f64::INFINITY,
+            is_of_boxes: true,
             balls: line.no_balls(),
             pieces: 0.0,
         };
@@ -273,8 +276,12 @@ impl<'a> DepthSearch<'a> {
         // Boxes are wider than vertices where offsets leave something out.
         let has_wide_box =
             |shape: Shape<'_>| shape.objects().iter().any(|of| of.vertices().left_out != [0.0; 3]);
-        if self.best > 0.0 && self.is_done() && (has_wide_box(line.a) || has_wide_box(line.b)) {
-            self.attempt(querier, unit(self.translation)?)?;
+        if self.is_of_boxes
+            && self.best > 0.0
+            && self.is_done()
+            && (has_wide_box(line.a) || has_wide_box(line.b))
+        {
+            self.attempt(querier, unit(self.translation)?, Search::Rough)?;
         }
         for start in self.first_directions() {
             if !self.is_done() {
@@ -372,9 +379,9 @@ impl<'a> DepthSearch<'a> {
     /// Tries a direction, and then the shortest ways beyond the planes through which ways came free.
     fn descend(&mut self, querier: &mut Querier, start: Point) -> Result<(), QueryError> {
         let mut planes = Vec::new();
-        let (mut direction, mut least) = (start, f64::INFINITY);
+        let (mut direction, mut search, mut least) = (start, Search::Rough, f64::INFINITY);
         while planes.len() < MAX_PLANES {
-            let Some(free) = self.attempt(querier, direction)? else { break };
+            let Some(free) = self.attempt(querier, direction, search)? else { break };
             let Some(last) = free.last.filter(|_| !self.is_done()) else { break };
             if free.at < (1.0 - LEAST_GAIN) * least {
                 planes.clear();
@@ -387,20 +394,26 @@ impl<'a> DepthSearch<'a> {
             if way >= (1.0 - LEAST_GAIN) * self.best || dot(next, direction) > 1.0 - 1e-9 {
                 break;
             }
-            direction = next;
+            (direction, search) = (next, Search::Near(way));
         }
         Ok(())
     }
 
     /// Goes a way until it comes free or is too long.
-    fn attempt(&mut self, querier: &mut Querier, direction: Point) -> Result<Option<Free>, QueryError> {
+    fn attempt(
+        &mut self,
+        querier: &mut Querier,
+        direction: Point,
+        search: Search,
+    ) -> Result<Option<Free>, QueryError> {
         let line = self.line.along(direction);
         // All moves shorter than the lower bound are covered, in whatever direction.
-        let free = querier.free_on(&line, self.lower(), WAY_FACTOR * self.best, true)?;
+        let free = querier.free_on(&line, self.lower(), WAY_FACTOR * self.best, search)?;
         if let Some(free) = &free
             && free.at < self.best
         {
             (self.best, self.translation) = (free.at, line.translation_at(free.at));
+            self.is_of_boxes = false;
             if let Some(last) = &free.last {
                 self.look_behind(querier, &line, free.at, last)?;
             }
@@ -420,9 +433,15 @@ impl<'a> DepthSearch<'a> {
         let mut best = self.balls;
         let back = |share: f64| [0, 1, 2].map(|k| last.point[k] - share * at * line.direction[k]);
         let ends = [(last.point, &last.triangles[0]), (back(1.0), &last.triangles[1])];
+        // Where smooth surfaces overlap, what is between the last contact's points tells all.
+        querier.offer(&a, &b, &mut best, back(0.5))?;
+        if self.options.is_enough(best.lower(), self.best) {
+            self.balls = best;
+            return Ok(());
+        }
         let behind =
             SHARES.iter().flat_map(|share| ends.map(|(point, triangle)| behind(point, triangle, share * at)));
-        for centre in behind.chain([back(0.5)]) {
+        for centre in behind {
             querier.offer(&a, &b, &mut best, centre)?;
         }
         if best.lower() > self.balls.lower() {

@@ -8,6 +8,9 @@ use crate::query::motion::radius;
 use crate::query::rounded::sum_of_radii;
 use bvh_format::vec3::length;
 
+/// From so many triangles on, a shape is fine.
+const MANY_TRIANGLES: u64 = 2048;
+
 /// Two shapes, and the line that B moves on.
 #[derive(Clone, Copy)]
 pub(super) struct Translation<'a> {
@@ -28,6 +31,8 @@ pub(super) struct Translation<'a> {
     pub(super) placing: f64,
     /// The size of the smaller triangles, about.
     pub(super) grain: f64,
+    /// Whether both have so many triangles that walks which decide about each one in contact take longer than distances.
+    pub(super) is_fine: bool,
 }
 
 impl<'a> Translation<'a> {
@@ -50,13 +55,14 @@ impl<'a> Translation<'a> {
             length += (0..3).map(|k| (hi[k] - lo[k]).powi(2)).sum::<f64>().sqrt();
             grain = grain.min(extent / (shape.triangles() as f64).sqrt());
         }
+        let is_fine = a.triangles().min(b.triangles()) >= MANY_TRIANGLES;
         magnitude += pose.translation().iter().map(|t| t.abs()).sum::<f64>();
         // Never 0, so that each turn of a search goes on, even for two points in one place.
         let error = (POSE_ERROR * (magnitude + size)).max(f64::MIN_POSITIVE);
         let length = 1.01 * length;
         let farthest = pose.translation().iter().fold(0.0f64, |most, t| most.max(t.abs())) + length;
         let placing = (PLACING_ERROR * (radius(b.objects()) + farthest)).max(f64::MIN_POSITIVE);
-        Self { a, b, pose, direction: [0.0; 3], length, size, radii, error, placing, grain }
+        Self { a, b, pose, direction: [0.0; 3], length, size, radii, error, placing, grain, is_fine }
     }
 
     pub(super) fn along(self, direction: Point) -> Self {
