@@ -7,6 +7,8 @@ use std::collections::BTreeSet;
 
 type Point = [f64; 3];
 type Triangle = [Point; 3];
+/// A name, two meshes, and how thick each of them is where the other one pierces it.
+type Case<'a> = (&'a str, &'a [Triangle], &'a [Triangle], Option<f64>, Option<f64>);
 
 /// Asks on all backends, which have to agree.
 #[track_caller]
@@ -242,7 +244,7 @@ fn what_is_pierced_is_as_thick_as_it_was_made() {
         .iter()
         .flat_map(|x| block([x - 0.1, -0.5, -0.05], [x + 0.1, 0.02, 0.05]))
         .collect();
-    let cases: [(&str, &[Triangle], &[Triangle], Option<f64>, Option<f64>); 7] = [
+    let cases: [Case<'_>; 7] = [
         ("duct through wall", &duct, &wall, None, Some(0.2)),
         // The wall is in the pipe's own wall, too, from the facets outside to those inside.
         ("pipe through wall", &pipe, &wall, Some(0.1 * (std::f64::consts::PI / 24.0).cos()), Some(0.2)),

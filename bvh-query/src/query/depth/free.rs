@@ -9,7 +9,7 @@
 //! ```
 //!
 //! A search for any free place first steps over fine meshes: while the shapes meet at a place further on, it goes there, and each
-//! step is longer than the one before.
+//! step is longer than the one before. From the free place that it finds, it goes back by what the distance there allows.
 //!
 //! A way is covered as far as the first two kinds of steps lead without a gap: interiors meet on all of it. The free place is
 //! free because exact arithmetic says so of the pose there, and of nothing else.
