@@ -8,7 +8,7 @@
 //! | do they touch? | [`Querier::collide`] | `bool`, exact |
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
 //! | where do they meet? | [`Querier::contact_regions`] | points, segments, polygons and normals, with certified errors |
-//! | how do they push each other? | [`Querier::patches`] | connected contacts: centre, normal, length, area, depth (estimated) |
+//! | how do they push each other? | [`Querier::patches`] | connected contacts: centre, normal, length, area, depth (estimated), contact points |
 //! | which triangles of one mesh meet where they should not? | [`Querier::self_contacts`], [`Querier::visit_self_contacts`] | pairs of triangle ids, exact |
 //! | how far apart are they? | [`Querier::distance`] | distance, both closest points, both triangle ids |
 //! | are they at most d apart? | [`Querier::within`] | `bool`, exact |
@@ -112,6 +112,7 @@ pub use query::distance::Distance;
 pub use query::intersection::{Intersection, IntersectionSurface};
 pub use query::motion::{MotionAnswer, MotionOptions, path_reach};
 pub use query::options::DistanceOptions;
+pub use query::patches::choice::PatchPoint;
 pub use query::patches::{Patch, PatchOptions, Patches};
 pub use query::probe::closest::ClosestPoint;
 pub use query::probe::placed::PlacedShape;

@@ -27,7 +27,7 @@ use crate::traverse::walk_memory::WalkMemory;
 ///   [`Querier::set_budget`].
 /// - Memory: 8 MiB, and at most 8 KiB for each treelet of either file that the query opens; no recursion. A page has at
 ///   most 110 treelets. The answer of [`Querier::contacts`] takes 16 bytes more per contact, and
-///   [`Querier::patches`] up to 2 KiB.
+///   [`Querier::patches`] up to 2 KiB, and 56 bytes per contact point.
 /// - Contacts: at most one for each pair of triangles for which the pages of both files have room, listed duplicates
 ///   included. More are an error.
 ///
@@ -103,7 +103,7 @@ impl Querier {
     /// - a pair of objects, and a pair of nodes or of leaf packets of both trees;
     /// - for a point or a line: an object, a node that is opened, and a leaf packet;
     /// - a contact that is reported: one that stands for duplicates counts once for each pair of them;
-    /// - for [`Querier::patches`]: what ten rays for each patch visit, and each 64 comparisons of points;
+    /// - for [`Querier::patches`]: what its rays visit, and each 64 comparisons of points;
     /// - for [`Querier::relation`], and where a shape is solid: each pair of a component of one mesh and an object of the
     ///   other;
     /// - for a motion: each interval of time, and each object of B in it beyond the first.

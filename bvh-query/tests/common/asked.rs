@@ -124,7 +124,7 @@ impl Answers {
         Self {
             collide: querier.collide(a, b, pose),
             patches: (contacts.len() < MAX_CONTACTS)
-                .then(|| querier.patches(a, b, pose, &PatchOptions::new().max_contacts(500))),
+                .then(|| querier.patches(a, b, pose, &PatchOptions::new().max_contacts(500).max_points(4))),
             contacts: visited.map(|_| contacts),
             self_contacts: self_visited.map(|_| self_contacts),
             within: querier.within(a, b, pose, if limit.is_finite() { limit } else { 0.0 }),

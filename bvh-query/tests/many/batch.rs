@@ -52,7 +52,8 @@ fn batches_answer_as_one_by_one() {
 fn batches_answer_about_overlaps_as_one_by_one() {
     let (a, b) = (baked(&cube()), baked(&moved(&cube(), 0.75, [0.25, 0.0, 0.5])));
     let poses = poses(&mut Random::new(5), 48);
-    let (depth, patch) = (PenetrationOptions::new().relative_gap(0.5), PatchOptions::new().max_contacts(20));
+    let (depth, patch) =
+        (PenetrationOptions::new().relative_gap(0.5), PatchOptions::new().max_contacts(20).max_points(6));
     let clash = ClashOptions::new().clearance(0.5).tolerance(0.1);
     let up = [0.0, 0.0, 2.0];
     let mut querier = Querier::new().unwrap();

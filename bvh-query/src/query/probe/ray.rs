@@ -224,11 +224,16 @@ impl First {
             .map(|best| self.ray.hit(best))
     }
 
+    /// Returns the parameter of the first hit of a triangle without a radius, and the triangle's unit normal.
+    pub(crate) fn met(&self) -> Option<(f64, [f64; 3])> {
+        let best = self.best.as_ref()?;
+        Some((best.crossing.t * self.ray.unit, narrow::unit_normal(&best.triangle)))
+    }
+
     /// Returns the parameter of the first hit if the ray leaves the triangle on the side that its normal points to.
     pub(crate) fn way_out(&self) -> Option<f64> {
-        let best = self.best.as_ref()?;
-        let is_out = narrow::dot(self.ray.ray.direction, narrow::unit_normal(&best.triangle)) > 0.0;
-        is_out.then_some(best.crossing.t * self.ray.unit)
+        let (t, normal) = self.met()?;
+        (narrow::dot(self.ray.ray.direction, normal) > 0.0).then_some(t)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Compares contact regions with exact arithmetic, and patches with configurations of which the answer is known.
 
 mod known;
+mod points;
 mod regions;
 
 use crate::common::nearest::dot;
@@ -13,17 +14,24 @@ fn patches(a: &Bvh, b: &Bvh, pose: &Pose, options: &PatchOptions) -> Patches {
     let mut answers = queriers().into_iter().map(|mut querier| querier.patches(a, b, pose, options).unwrap());
     let first = answers.next().unwrap();
     answers.for_each(|other| assert_eq!(other, first));
-    let mut place = 0;
+    let (mut place, mut point) = (0, 0);
     for patch in &first.patches {
         assert_eq!(patch.first, place, "{patch:?}");
         place += patch.count;
+        assert_eq!(patch.first_point, point, "{patch:?}");
+        assert!(patch.point_count <= options.max_points, "{patch:?}");
+        point += patch.point_count;
         let contacts = &first.regions[patch.first..][..patch.count];
         assert!(contacts.is_sorted_by(|p, q| p.contact < q.contact) && contacts.len() == patch.count);
         assert!(patch.normal == [0.0; 3] || is_close(dot(patch.normal, patch.normal), 1.0), "{patch:?}");
         let numbers = [patch.center, patch.normal, [patch.length, patch.area, patch.depth]];
         assert!(numbers.as_flattened().iter().all(|x| x.is_finite()), "{patch:?}");
     }
-    assert_eq!(place, first.regions.len());
+    assert_eq!((place, point), (first.regions.len(), first.points.len()));
+    for of in &first.points {
+        assert!(of.point.iter().all(|x| x.is_finite()) && of.depth.is_finite(), "{of:?}");
+        assert!(is_close(dot(of.normal, of.normal), 1.0), "{of:?}");
+    }
     let lowest = first.patches.iter().map(|patch| first.regions[patch.first].contact);
     assert!(lowest.is_sorted());
     first

@@ -62,7 +62,7 @@ fn each_pair_question(
         ("collide", &|q| text(q.collide(a, b, pose))),
         ("contacts", &|q| text(q.contacts(a, b, pose))),
         ("contact_regions", &|q| text(q.contact_regions(a, b, pose, 100))),
-        ("patches", &|q| text(q.patches(a, b, pose, &PatchOptions::new()))),
+        ("patches", &|q| text(q.patches(a, b, pose, &PatchOptions::new().max_points(4)))),
         ("distance", &|q| text(q.distance(a, b, pose))),
         ("distance_with", &|q| text(q.distance_with(a, b, pose, loose))),
         ("within", &|q| text(q.within(a, b, pose, 5.0))),
