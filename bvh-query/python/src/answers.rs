@@ -237,9 +237,17 @@ pub(crate) fn regions<'py>(
         .into_pyobject(py)
 }
 
-/// Centre, normal, length, area, depth, first and count of each patch, and the regions in their order.
+/// Centre, normal, length, area, depth, first and count of each patch, the regions in their order, and first and count of each
+/// patch's points, the points, their normals and depths.
 pub(crate) fn patches<'py>(py: Python<'py>, of: &Patches) -> PyResult<Bound<'py, PyTuple>> {
     let patches = || of.patches.iter();
+    let points = (
+        array(py, patches().map(|of| of.first_point as i64)),
+        array(py, patches().map(|of| of.point_count as i64)),
+        table(py, of.points.iter().map(|of| of.point))?,
+        table(py, of.points.iter().map(|of| of.normal))?,
+        array(py, of.points.iter().map(|of| of.depth)),
+    );
     (
         table(py, patches().map(|of| of.center))?,
         table(py, patches().map(|of| of.normal))?,
@@ -249,6 +257,7 @@ pub(crate) fn patches<'py>(py: Python<'py>, of: &Patches) -> PyResult<Bound<'py,
         array(py, patches().map(|of| of.first as i64)),
         array(py, patches().map(|of| of.count as i64)),
         regions(py, &of.regions, of.total)?,
+        points,
     )
         .into_pyobject(py)
 }

@@ -250,10 +250,14 @@ pub(crate) fn patches<'py>(
     asked: Asked<'py>,
     tolerance: &Bound<'py, PyAny>,
     max_contacts: Option<&Bound<'py, PyAny>>,
+    max_points: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let question = Question::new(&asked)?;
     let most = limit(max_contacts, "max_contacts")?;
-    let options = PatchOptions::new().tolerance(number(tolerance, "tolerance")?).max_contacts(most);
+    let options = PatchOptions::new()
+        .tolerance(number(tolerance, "tolerance")?)
+        .max_contacts(most)
+        .max_points(limit(max_points, "max_points")?);
     let found = question.ask(
         |batch, poses| batch.patches(poses, &options),
         |querier, [a, b], pose| querier.patches(a, b, pose, &options),

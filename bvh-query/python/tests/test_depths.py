@@ -207,6 +207,25 @@ class Depths(unittest.TestCase):
         cut = self.cube.patches(self.small, poked, max_contacts=3, tolerance=0.1)
         self.assertEqual((len(cut.regions.triangles), cut.regions.total), (3, deep.regions.total))
 
+    def test_points_of_patches_are_corners(self):
+        poked, apart = shifts((0.25, 0, 0.55), (9, 0, 0))
+        deep, none = self.cube.patches(self.small, np.stack([poked, apart]), max_points=4)
+        self.assertEqual((deep.first_point.tolist(), deep.point_count.tolist()), ([0], [4]))
+        # The small cube has sides of 0.25, and its bottom is 0.075 below the top of the other one.
+        corners = [[x, y, 0.4625] for x in (0.125, 0.375) for y in (-0.125, 0.125)]
+        np.testing.assert_allclose(sorted(deep.points.tolist()), corners, atol=1e-12)
+        np.testing.assert_allclose(deep.point_normals, [[0, 0, 1]] * 4, atol=1e-12)
+        np.testing.assert_allclose(deep.point_depths, [0.075] * 4)
+        self.assertEqual((none.points.shape, none.point_normals.shape, none.point_depths.shape), ((0, 3), (0, 3), (0,)))
+        without, one = self.cube.patches(self.small, poked), self.cube.patches(self.small, poked, max_points=1)
+        self.assertEqual((len(without.points), without.point_count.tolist(), len(one.points)), (0, [0], 1))
+        for name in ("center", "normal", "length", "area", "depth", "first", "contact_count"):
+            np.testing.assert_array_equal(getattr(without, name), getattr(deep, name))
+        # As a margin, a radius gives the gap of the cores, here 0.05.
+        near = self.cube.rounded(0.1).patches(self.small, shifts((0.25, 0, 0.675))[0], tolerance=1.0, max_points=4)
+        np.testing.assert_allclose(sorted(near.points.tolist()), np.add(corners, [0, 0, 0.0625]), atol=1e-12)
+        np.testing.assert_allclose(near.point_depths, [-0.05] * 4)
+
     def test_self_contacts_are_those_of_known_meshes(self):
         vertices, faces = cube()
         both = cbvh.bake(np.concatenate([vertices, vertices + 0.5]), np.concatenate([faces, np.array(faces) + 8]))
@@ -319,6 +338,8 @@ class Depths(unittest.TestCase):
             (ValueError, "limit: expected a whole number", lambda: mesh.contact_regions(mesh, at, limit=-1)),
             (ValueError, "tolerance: expected a finite length of at least 0", lambda: mesh.patches(mesh, none, tolerance=-1)),
             (TypeError, "max_contacts: expected a whole number", lambda: mesh.patches(mesh, at, max_contacts="x")),
+            (TypeError, "max_points: expected a whole number", lambda: mesh.patches(mesh, at, max_points=1.5)),
+            (ValueError, "max_points: expected a whole number", lambda: mesh.patches(mesh, at, max_points=-1)),
             (TypeError, "limit: expected a whole number", lambda: mesh.self_contacts(limit="x")),
             (TypeError, "other: expected a cbvh.Mesh", mesh.penetration, "x", at),
             (ValueError, "poses: expected shape (4, 4) or (N, 4, 4), found (3, 4)", mesh.patches, mesh, at[:3]),

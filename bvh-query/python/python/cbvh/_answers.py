@@ -264,6 +264,15 @@ class Patches(NamedTuple):
     - ``first``: the row in ``regions`` of a patch's first contact, shape (P,).
     - ``contact_count``: the number of its contacts, shape (P,).
     - ``regions``: the `ContactRegions` of the first patch, of the second one, and so on, in ascending order within each.
+    - ``first_point``: the row in ``points`` of a patch's first contact point, shape (P,).
+    - ``point_count``: the number of its contact points, shape (P,).
+    - ``points``: Q contact points, those of the first patch, of the second one, and so on; none without ``max_points``. Each
+      is in the middle between both surfaces on a line along the patch's normal, or where they meet. Shape (Q, 3).
+    - ``point_normals``: the direction in which the first mesh pushes the second at each point, at length 1. It is that of
+      the surfaces where the line meets them, so points of a curved patch have different ones. Shape (Q, 3).
+    - ``point_depths``: how deep the meshes overlap at each point along its normal, at least 0. For meshes with a radius,
+      it is about their cores: minus the gap between these where they are apart. So a radius serves as the margin of a
+      simulator; if the radii are a part of the bodies, add their sum. Shape (Q,).
     """
 
     center: Floats
@@ -274,6 +283,11 @@ class Patches(NamedTuple):
     first: NDArray[np.int64]
     contact_count: NDArray[np.int64]
     regions: ContactRegions
+    first_point: NDArray[np.int64]
+    point_count: NDArray[np.int64]
+    points: Floats
+    point_normals: Floats
+    point_depths: Floats
 
 
 class SelfContacts(NamedTuple):
@@ -601,5 +615,5 @@ def regions_of(found: tuple[Any, ...]) -> ContactRegions:
 
 def patches_of(found: tuple[Any, ...]) -> Patches:
     """What the compiled module tells of patches."""
-    regions: Any = regions_of(found[-1])
-    return Patches(*found[:-1] + (regions,))
+    *numbers, regions, points = found
+    return Patches(*numbers, regions_of(regions), *points)

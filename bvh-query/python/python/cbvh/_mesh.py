@@ -399,6 +399,7 @@ class Mesh:
         *,
         tolerance: float = 0.0,
         max_contacts: int | None = None,
+        max_points: int | None = 0,
         parallel: bool = False,
     ) -> Any:
         """How do they push each other? Contacts joined into connected patches with a centre, a normal and an estimated depth
@@ -410,8 +411,15 @@ class Mesh:
         ones in ascending order; None: all. Meshes need not be closed; the depth is 0 where a line of sight meets the
         outside of a surface or nothing. Cost: that of `contact_regions`, 0.3 us more for each contact, and some 10 us
         for each patch.
+
+        ``max_points``: the largest number of contact points of each patch, as simulators use them; None: all that help.
+        The deepest one comes first, then those that most enlarge the outline of the chosen ones, as long as they do by more
+        than a 256th: four for a box on a floor, and about 16 at most for a round outline. Points change little where a pose
+        does, unless another point becomes the better one. Cost: 15 us more for the patch of a box on a floor, some
+        70 us for a round one, and twice that if more than eight points are wanted.
         """
-        found = _cbvh.patches((self._mesh, _other(other), poses, parallel), tolerance, max_contacts)
+        asked = (self._mesh, _other(other), poses, parallel)
+        found = _cbvh.patches(asked, tolerance, max_contacts, max_points)
         return [patches_of(of) for of in found] if isinstance(found, list) else patches_of(found)
 
     def self_contacts(self, *, limit: int | None = None) -> SelfContacts:
