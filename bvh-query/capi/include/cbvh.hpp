@@ -83,6 +83,7 @@ using Point = std::array<double, 3>;
 using Contact = cbvh_contact;
 using ContactRegion = cbvh_contact_region;
 using Patch = cbvh_patch;
+using ContactPoint = cbvh_contact_point;
 using SelfContact = cbvh_self_contact;
 using OpenEdgeCounts = cbvh_open_edge_counts;
 using OpenEdge = cbvh_open_edge;
@@ -224,8 +225,10 @@ struct ClashOptions {
 struct PatchOptions {
     double tolerance = 0;
     std::size_t max_contacts = 0;
+    /// For contact points: the largest number for each patch.
+    std::size_t max_points = 4;
 
-    cbvh_patch_options raw() const { return {sizeof(cbvh_patch_options), tolerance, max_contacts}; }
+    cbvh_patch_options raw() const { return {sizeof(cbvh_patch_options), tolerance, max_contacts, max_points}; }
 };
 
 /// Contacts, joined into patches.
@@ -235,6 +238,12 @@ struct Patches {
     std::vector<ContactRegion> regions;
     /// The number of all contacts: more than there are here if `max_contacts` left some out.
     std::size_t total = 0;
+};
+
+/// Contact points, and the patches that they belong to.
+struct ContactPoints {
+    std::vector<ContactPoint> points;
+    std::vector<Patch> patches;
 };
 
 /// See cbvh_bake_options. Empty text stands for the default.
@@ -852,6 +861,24 @@ public:
         found.regions.resize(region_count);
         found.total = counts.total;
         region_room_.set(std::max(region_count, detail::few));
+        return found;
+    }
+    /// At which points do they push each other? Those of the patches, as simulators use them.
+    ContactPoints contact_points(const Mesh &a, const Mesh &b, const Pose &pose, const PatchOptions &options = {}) {
+        const cbvh_patch_options raw_options = options.raw();
+        ContactPoints found;
+        std::size_t patch_count = detail::few, point_count = detail::few;
+        cbvh_status status = CBVH_BUFFER_TOO_SMALL;
+        while (status == CBVH_BUFFER_TOO_SMALL) {
+            found.patches.resize(patch_count);
+            found.points.resize(point_count);
+            status = cbvh_contact_points(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, nullptr, found.points.data(),
+                                         found.points.size(), &point_count, found.patches.data(), found.patches.size(),
+                                         &patch_count);
+        }
+        check(status);
+        found.patches.resize(patch_count);
+        found.points.resize(point_count);
         return found;
     }
     /// How far does b move along a direction until their interiors are disjoint?

@@ -9,7 +9,8 @@ use crate::queriers;
 use crate::status::Failure;
 use crate::types::{
     ClashChoices, ClashRow, MeshHandle, PatchChoices, PatchCounts, PatchRow, PenetrationChoices,
-    PenetrationRow, PoseRows, QuerierHandle, RegionRow, SelfContactRow, SeparationRow, SignedDistanceRow,
+    PenetrationRow, PointRow, PoseRows, QuerierHandle, RegionRow, SelfContactRow, SeparationRow,
+    SignedDistanceRow,
 };
 use bvh_query::{Pose, Querier, QueryError, Shape};
 
@@ -190,6 +191,57 @@ pub unsafe extern "C" fn cbvh_patches(
             }
             // Both say how many there are, also where the other one has too little room.
             let finished = list_of_regions.map_or(Ok(()), List::finish);
+            list.finish().and(finished)
+        })
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_contact_points(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    poses: *const PoseRows,
+    pose_count: usize,
+    options: *const PatchChoices,
+    counts: *mut usize,
+    points: *mut PointRow,
+    capacity: usize,
+    count: *mut usize,
+    patches: *mut PatchRow,
+    patch_capacity: usize,
+    patch_count: *mut usize,
+) -> i32 {
+    let question = Question { querier, a, b, poses, count: pose_count };
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        question.ask(|querier, _, [a, b], poses| {
+            let options = input::options("options", options)?.read_with_points();
+            let mut counts = Room::new("counts", counts, if counts.is_null() { 0 } else { poses.len() })?;
+            let mut list = List::new("points", points, capacity, count)?;
+            let wants_patches = !patch_count.is_null();
+            let list_of_patches = || List::new("patches", patches, patch_capacity, patch_count);
+            let mut list_of_patches = wants_patches.then(list_of_patches).transpose()?;
+            // Those of earlier poses.
+            let (mut patches_before, mut contacts_before) = (0, 0);
+            for (number, pose) in poses.iter().enumerate() {
+                let found = querier.patches(a, b, pose, &options)?;
+                counts.set(number, found.points.len());
+                for (patch, of) in found.patches.iter().enumerate() {
+                    let points = &found.points[of.first_point..][..of.point_count];
+                    list.add(points.iter().map(|point| PointRow::new(patches_before + patch, point)));
+                }
+                patches_before += found.patches.len();
+                if let Some(list) = &mut list_of_patches {
+                    list.add(found.patches.into_iter().map(|mut patch| {
+                        patch.first += contacts_before;
+                        patch
+                    }));
+                }
+                contacts_before += found.regions.len();
+            }
+            // Both say how many there are, also where the other one has too little room.
+            let finished = list_of_patches.map_or(Ok(()), List::finish);
             list.finish().and(finished)
         })
     })

@@ -6,7 +6,7 @@ use crate::input::Plain;
 use crate::status::Failure;
 use bvh_query::{
     Backend, Clash, ClashClass, ClashOptions, ClosestPoint, Contact, ContactRegion, Distance,
-    DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, Penetration,
+    DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, PatchPoint, Penetration,
     PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash, SceneClosestPoint,
     SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SceneSignedDistance, SelfContact,
     SelfContactKind, Separation, Side, SignedDistance, SignedPointDistance,
@@ -50,7 +50,7 @@ structures! {
     MotionChoices { size: usize, clearance: f64, tolerance: f64 }
     PenetrationChoices { size: usize, relative_gap: f64, tolerance: f64 }
     ClashChoices { size: usize, clearance: f64, tolerance: f64, relative_gap: f64, visits: u64 }
-    PatchChoices { size: usize, tolerance: f64, max_contacts: usize }
+    PatchChoices { size: usize, tolerance: f64, max_contacts: usize, max_points: usize }
     BakeChoices {
         size: usize,
         profile: *const c_char,
@@ -131,6 +131,7 @@ structures! {
     }
     PatchRow { first: usize, count: usize, center: [f64; 3], normal: [f64; 3], length: f64, area: f64, depth: f64 }
     PatchCounts { patches: usize, contacts: usize, total: usize }
+    PointRow { patch: usize, point: [f64; 3], normal: [f64; 3], depth: f64 }
     OpenEdgesRow {
         boundary: u64,
         flipped: u64,
@@ -301,10 +302,27 @@ impl ClashChoices {
     }
 }
 
+/// The largest number of contact points of each patch if a caller does not say it.
+const DEFAULT_POINTS: usize = 4;
+
 impl PatchChoices {
+    /// Reads how contacts are joined. No points are wanted.
     pub(crate) fn read(&self) -> PatchOptions {
         let most = if self.max_contacts == 0 { usize::MAX } else { self.max_contacts };
         PatchOptions::new().tolerance(self.tolerance).max_contacts(most)
+    }
+
+    /// Reads how contacts are joined, and how many points are wanted.
+    pub(crate) fn read_with_points(&self) -> PatchOptions {
+        let most = if self.max_points == 0 { DEFAULT_POINTS } else { self.max_points };
+        self.read().max_points(most)
+    }
+}
+
+impl PointRow {
+    /// A point of the patch with this number.
+    pub(crate) fn new(patch: usize, of: &PatchPoint) -> Self {
+        Self { patch, point: of.point, normal: of.normal, depth: of.depth }
     }
 }
 

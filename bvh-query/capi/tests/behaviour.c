@@ -296,6 +296,32 @@ static void overlaps(void) {
     FAILS(cbvh_patches(querier, one, one, three, 4, NULL, NULL, patches, 3, &count, some, 4, &region_count),
           CBVH_BUFFER_TOO_SMALL, "regions: expected room for");
     CHECK(count == 3 && region_count == 2 * counts[0] + counts[2]);
+    /* The corner of one cube is in the other one, and each pose has its own patches. Flush faces have their corners. */
+    cbvh_contact_point points_of[12];
+    size_t point_counts[4], patch_count;
+    const cbvh_pose sunk[2] = {shift(0.125, 0.25, 0.9375), poses[2]};
+    cbvh_patch alone[2];
+    OK(cbvh_contact_points(querier, one, one, sunk, 2, NULL, point_counts, points_of, 12, &count, alone, 2,
+                           &patch_count));
+    CHECK(point_counts[0] == 4 && point_counts[1] == 4 && count == 8 && patch_count == 2);
+    CHECK(alone[0].first == 0 && alone[1].first == alone[0].count);
+    for (size_t k = 0; k < 8; k++) {
+        const cbvh_contact_point *at = &points_of[k];
+        CHECK(at->patch == k / 4 && fabs(at->normal[0] * at->normal[0] + at->normal[1] * at->normal[1] +
+                                         at->normal[2] * at->normal[2] - 1) < 1e-12);
+        CHECK(k < 4 ? at->depth >= 0 && at->depth < 0.064 && at->point[2] > 0.4374 : fabs(at->depth) < 1e-12);
+    }
+    CHECK(fabs(points_of[0].depth - 0.0625) < 1e-3);
+    const cbvh_patch_options single = {.size = sizeof single, .max_points = 1};
+    OK(cbvh_contact_points(querier, one, one, sunk, 2, &single, NULL, points_of, 2, &count, NULL, 0, NULL));
+    CHECK(count == 2 && points_of[1].patch == 1);
+    /* An older program, whose options end before the number of points. */
+    const cbvh_patch_options older = {.size = offsetof(cbvh_patch_options, max_points), .max_points = 1};
+    OK(cbvh_contact_points(querier, one, one, sunk, 2, &older, NULL, points_of, 12, &count, NULL, 0, NULL));
+    CHECK(count == 8);
+    FAILS(cbvh_contact_points(querier, one, one, sunk, 2, NULL, NULL, points_of, 7, &count, alone, 1, &patch_count),
+          CBVH_BUFFER_TOO_SMALL, "points: expected room for 8 elements, found room for 7");
+    CHECK(count == 8 && patch_count == 2);
     /* Each contact of two balls is a point, and two of four are the same. Points that may be far apart are one patch. */
     const double points[6] = {0, 0, 0, 0.5, 0, 0};
     cbvh_mesh cloud, balls;

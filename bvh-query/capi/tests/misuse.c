@@ -467,6 +467,8 @@ static void overlaps(void) {
               "tolerance: ");
         FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, &apart, NULL, patches, 1, &count, NULL, 0, NULL),
               CBVH_INVALID_ARGUMENT, "tolerance: ");
+        FAILS(cbvh_contact_points(querier, mesh, mesh, poses, 2, &apart, NULL, NULL, 0, &count, NULL, 0, NULL),
+              CBVH_INVALID_ARGUMENT, "tolerance: ");
     }
     const cbvh_penetration_options other = {.size = 8}, all = {.size = sizeof all};
     FAILS(cbvh_penetrations(querier, mesh, mesh, poses, 2, &other, depths), CBVH_INVALID_ARGUMENT,
@@ -522,6 +524,15 @@ static void overlaps(void) {
           CBVH_INVALID_ARGUMENT, "regions: expected a pointer, found NULL");
     FAILS(cbvh_patches(querier, mesh, mesh, poses, 2, NULL, MISALIGNED(cbvh_patch_counts), patches, 1, &count, NULL, 0,
               NULL), CBVH_INVALID_ARGUMENT, "counts: expected an address");
+    cbvh_contact_point points[4];
+    FAILS(cbvh_contact_points(querier, mesh, no_mesh, poses, 2, NULL, NULL, points, 4, &count, NULL, 0, NULL),
+          CBVH_INVALID_HANDLE, "b: ");
+    FAILS(cbvh_contact_points(querier, mesh, mesh, poses, 2, NULL, NULL, NULL, 1, &count, NULL, 0, NULL),
+          CBVH_INVALID_ARGUMENT, "points: expected a pointer, found NULL");
+    FAILS(cbvh_contact_points(querier, mesh, mesh, poses, 2, NULL, NULL, points, 4, NULL, NULL, 0, NULL),
+          CBVH_INVALID_ARGUMENT, "count: expected a pointer, found NULL");
+    FAILS(cbvh_contact_points(querier, mesh, mesh, poses, 2, NULL, NULL, points, 4, &count, NULL, 1, &region_count),
+          CBVH_INVALID_ARGUMENT, "patches: expected a pointer, found NULL");
     cbvh_open_edge_counts counted;
     FAILS(cbvh_mesh_open_edge_counts(no_mesh, &counted), CBVH_INVALID_HANDLE, "mesh: ");
     FAILS(cbvh_mesh_open_edge_counts(mesh, NULL), CBVH_INVALID_ARGUMENT, "counts: expected a pointer, found NULL");

@@ -263,8 +263,10 @@ int main(int argument_count, char **arguments) {
         case 80: status = cbvh_separations(q, a, b, in, more, n, out); break;
         case 81: status = cbvh_penetrations(q, a, b, in, n, options, out); break;
         case 82: status = cbvh_contact_regions(q, a, b, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
-        case 83: status = cbvh_patches(q, a, b, in, n, options, NULL, out, capacity, &count, NULL, 0,
-            below(2) ? NULL : counts); break;
+        case 83: status = below(2) ? cbvh_patches(q, a, b, in, n, options, NULL, out, capacity, &count, NULL, 0,
+                                                  below(2) ? NULL : counts)
+                                   : cbvh_contact_points(q, a, b, in, n, options, below(2) ? NULL : counts, out, capacity,
+                                                         &count, NULL, 0, NULL); break;
         case 84: status = cbvh_self_contacts(q, a, out, capacity, &count); break;
         case 85: status = cbvh_clashes(q, a, b, in, n, options, out); break;
         case 86: status = cbvh_scene_clashes(s, options, out, capacity, &count); break;

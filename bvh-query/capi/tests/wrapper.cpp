@@ -218,6 +218,9 @@ void overlaps() {
     CHECK(std::abs(found.patches[0].length - 4.125) < 1e-9 && querier.patches(one, one, away).patches.empty());
     const auto few = querier.patches(one, one, corner, {0, 5});
     CHECK(few.regions.size() == 5 && few.total == regions.size());
+    const auto sunk = querier.contact_points(one, one, cbvh::Pose::translation(0.125, 0.25, 0.9375));
+    CHECK(sunk.patches.size() == 1 && sunk.points.size() == 4 && sunk.points[3].patch == 0 && sunk.points[0].depth > 0.06);
+    CHECK(querier.contact_points(one, one, away).points.empty());
     CHECK(querier.self_contacts(one).empty());
     const cbvh::Mesh twice = cbvh::Mesh::bake({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}});
     CHECK(one.open_edges().empty() && one.open_edge_counts().boundary == 0 && one.open_edges_text() == "no edge is open");

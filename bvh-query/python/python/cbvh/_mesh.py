@@ -415,7 +415,7 @@ class Mesh:
         ``max_points``: the largest number of contact points of each patch, as simulators use them; None: all that help.
         The deepest one comes first, then those that most enlarge the outline of the chosen ones, as long as they do by more
         than a 256th: four for a box on a floor, and about 16 at most for a round outline. Points change little where a pose
-        does, unless another point becomes the better one. Cost: 15 us more for the patch of a box on a floor, some
+        does, unless another point becomes the better one. Cost: 8 us more for the patch of a box on a floor, some
         70 us for a round one, and twice that if more than eight points are wanted.
         """
         asked = (self._mesh, _other(other), poses, parallel)

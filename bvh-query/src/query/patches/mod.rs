@@ -131,7 +131,7 @@ impl Querier {
     ///
     /// The answer has the same bits on all backends. Cost: that of `contact_regions`, some 0.3 us more for each contact,
     /// up to ten rays for each patch, some 10 us, and while it runs some 1 KiB for each contact. Points take up to 60 rays more for
-    /// each patch, or 108 if more than eight are wanted, and 84 or 148 for rounded shapes: some 15 us for a box on a floor, and 70 us
+    /// each patch, or 108 if more than eight are wanted, and 84 or 148 for rounded shapes: some 8 us for a box on a floor, and 70 us
     /// for a round patch. All of these count as visits ([`Querier::set_budget`]), as do comparisons of points that are almost alike.
     ///
     /// # Errors

@@ -182,12 +182,15 @@ impl Querier {
         for vertex in of_a.points() {
             lines.add_vertex(&sides.b, vertex, -1.0)?;
         }
+        lines.add_line(plane.center, true)?;
         for (point, vertex) in outline.points() {
             lines.add_region_point(contacts, vertex);
             let inward = subtract(plane.center, point);
-            lines.add_line([0, 1, 2].map(|k| point[k] + INWARD * inward[k]), false)?;
+            let near = [0, 1, 2].map(|k| point[k] + INWARD * inward[k]);
+            if !lines.has_deep_point_beyond(near) {
+                lines.add_line(near, false)?;
+            }
         }
-        lines.add_line(plane.center, true)?;
         Ok(choose(lines.found, most))
     }
 
@@ -300,6 +303,19 @@ impl Lines<'_, '_> {
             self.add(middle, length, if is_center { up } else { unit(mean.0) });
         }
         Ok(())
+    }
+
+    /// Returns whether there is a point just outward of this one that is at least half as deep as the deepest one, so that measuring
+    /// here would find none that is better. Of a box, these are its corners.
+    fn has_deep_point_beyond(&self, near: [f64; 3]) -> bool {
+        let deepest = self.found.iter().fold(0.0_f64, |most, of| most.max(of.point.depth));
+        let [x, y] = self.plane.place(near);
+        let square = x * x + y * y;
+        let is_beyond = |[p, q]: [f64; 2]| {
+            let [along, across] = [p * x + q * y - square, p * y - q * x];
+            along >= 0.0 && along <= 2.0 * INWARD * square && across.abs() <= 2.0 * INWARD * square
+        };
+        deepest > 0.0 && self.found.iter().any(|of| of.point.depth >= 0.5 * deepest && is_beyond(of.place))
     }
 
     /// Adds a point in which regions meet. It is on both surfaces, or between cores that are apart.
