@@ -622,7 +622,7 @@ typedef struct cbvh_contact_point {
  * four for a box on a floor, and about 16 at most for a round outline. Points change little where a pose does, unless
  * another point becomes the better one. `counts` gets the number of points of each pose, and may be NULL. `patches` gets
  * the patches in a list of their own. If `patch_count` is NULL, it gets none. One core is used. It takes up to 60 rays
- * for each patch more than cbvh_patches, or 108 if more than eight points are wanted, some 8 to 70 us. */
+ * for each patch more than cbvh_patches, or 108 if more than eight points are wanted, some 8 to 40 us. */
 cbvh_status cbvh_contact_points(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses,
                                 size_t pose_count, const cbvh_patch_options *options, size_t *counts,
                                 cbvh_contact_point *points, size_t capacity, size_t *count, cbvh_patch *patches,

@@ -416,7 +416,7 @@ class Mesh:
         The deepest one comes first, then those that most enlarge the outline of the chosen ones, as long as they do by more
         than a 256th: four for a box on a floor, and about 16 at most for a round outline. Points change little where a pose
         does, unless another point becomes the better one. Cost: 8 us more for the patch of a box on a floor, some
-        70 us for a round one, and twice that if more than eight points are wanted.
+        40 us for a round one, and twice that if more than eight points are wanted.
         """
         asked = (self._mesh, _other(other), poses, parallel)
         found = _cbvh.patches(asked, tolerance, max_contacts, max_points)

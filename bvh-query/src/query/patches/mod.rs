@@ -112,13 +112,15 @@ impl Querier {
     /// rounded shapes the depth is the largest `overlap`.
     ///
     /// **Points.** Simulators need a few points at which a patch pushes ([`PatchOptions::max_points`]). The curve does not give
-    /// them, because surfaces that cross are not deep there. Candidates are the vertices of the patch's triangles that are inside
-    /// the other mesh, the points of its regions, and the middles of the overlap on lines along the normal: through the centre, and
-    /// a 512th inward of the outermost points of regions. Each has its depth along its line ([`PatchPoint::depth`]); that of points
-    /// of regions is 0. The deepest candidate is chosen first, and then, one by one, that which most enlarges the outline of those
-    /// chosen, seen along the normal. There, deep points count for up to twice as much as those that are not deep. A point that
-    /// enlarges the outline by less than a 256th is not chosen, so there may be fewer points than `max_points`: four for a box on a
-    /// floor, and about 16 at most for a round outline.
+    /// them, because surfaces that cross are not deep there. Candidates are the vertices of the patch's triangles that are
+    /// inside the other mesh, the points of its regions, and the middles of the overlap on lines along the normal: through the
+    /// centre, and a 512th inward of the outermost points of regions that are at walls. Each has its depth along its line
+    /// ([`PatchPoint::depth`]); that of points of regions is 0. If the line from a vertex is more than twice as long as the way
+    /// to the plane of the nearest triangle with which its own ones are in contact, that plane counts: in a sliver between
+    /// walls, the line may leave the overlap anywhere. The deepest candidate is chosen first, and then, one by one, that which
+    /// most enlarges the outline of those chosen, seen along the normal. There, deep points count for up to twice as much as
+    /// those that are not deep. A point that enlarges the outline by less than a 256th is not chosen, so there may be fewer
+    /// points than `max_points`: four for a box on a floor, and about 16 at most for a round outline.
     ///
     /// A small change of the pose changes the points by little, unless another candidate becomes the better one. Candidates that are
     /// equal but for a thousandth are told apart by a fixed direction of A's frame, turned into the plane of the patch, so noise does
@@ -131,7 +133,7 @@ impl Querier {
     ///
     /// The answer has the same bits on all backends. Cost: that of `contact_regions`, some 0.3 us more for each contact,
     /// up to ten rays for each patch, some 10 us, and while it runs some 1 KiB for each contact. Points take up to 60 rays more for
-    /// each patch, or 108 if more than eight are wanted, and 84 or 148 for rounded shapes: some 8 us for a box on a floor, and 70 us
+    /// each patch, or 108 if more than eight are wanted, and 84 or 148 for rounded shapes: some 8 us for a box on a floor, and 40 us
     /// for a round patch. All of these count as visits ([`Querier::set_budget`]), as do comparisons of points that are almost alike.
     ///
     /// # Errors

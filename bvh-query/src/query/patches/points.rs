@@ -6,8 +6,8 @@
 //!
 //! - vertices of one mesh that are inside the other one, of the patch's triangles;
 //! - points of the patch's regions, whose depth is 0;
-//! - lines through the centre and, a little inward, through the outermost of these points. They find the depth where triangles are so
-//!   fine that none of the patch reaches the bottom.
+//! - lines through the centre and, where walls are, a little inward of the outermost of these points. They find the depth where triangles
+//!   are so fine that none of the patch reaches the bottom.
 //!
 //! Of the first two kinds, those are kept that reach farthest in some directions of the plane perpendicular to the normal, and of
 //! vertices the deepest ones. Each is measured by up to four rays along the normal, so a patch takes a bounded number of them,
@@ -51,6 +51,9 @@ const DEPTH_SHARE: f64 = 0.25;
 /// How far inward from the outermost points of the curve lines are measured, as a share of their way to the centre. Beside a curve that
 /// runs along a wall, they are inside both meshes; the area that is lost is less than what adds a point (`choice`).
 const INWARD: f64 = 1.0 / 512.0;
+
+/// How far a vertex may be outside of the outline, as a share of how far the outline reaches.
+const UNDERCUT: f64 = 0.25;
 
 /// Three directions at right angles, each of length 1, of which none is near that of an axis. The first one turns to the normal.
 const FRAME: [[f64; 3]; 3] = [
@@ -176,19 +179,20 @@ impl Querier {
         }
         let [of_a, of_b] = inner_vertices(sides, &plane, contacts, &outline);
         let mut lines = Lines { querier: self, sides, plane: &plane, found: Vec::new() };
-        for vertex in of_b.points() {
-            lines.add_vertex(&sides.a, vertex, 1.0)?;
+        for (mesh, inner, side, sign) in [(&sides.a, of_b, B, 1.0), (&sides.b, of_a, A, -1.0)] {
+            let vertices = inner.points();
+            let faces = faces_above(&vertices, &plane, contacts, side);
+            for (vertex, face) in vertices.into_iter().zip(faces) {
+                lines.add_vertex(mesh, vertex, face, sign)?;
+            }
         }
-        for vertex in of_a.points() {
-            lines.add_vertex(&sides.b, vertex, -1.0)?;
-        }
-        lines.add_line(plane.center, true)?;
+        lines.add_line(plane.center, LineKind::Center)?;
         for (point, vertex) in outline.points() {
-            lines.add_region_point(contacts, vertex);
+            let is_at_wall = lines.add_region_point(contacts, vertex);
             let inward = subtract(plane.center, point);
             let near = [0, 1, 2].map(|k| point[k] + INWARD * inward[k]);
-            if !lines.has_deep_point_beyond(near) {
-                lines.add_line(near, false)?;
+            if is_at_wall && !lines.has_deep_point_beyond(near) {
+                lines.add_line(near, LineKind::Rim)?;
             }
         }
         Ok(choose(lines.found, most))
@@ -223,11 +227,13 @@ fn inner_vertices(
             for corner in corners.iter().filter(|_| cosine > 0.0) {
                 let depth = dot(outside, subtract(*on_both, *corner));
                 let from = subtract(*corner, plane.center);
-                // Below an undercut, a vertex may be outside of the outline by as much as it is deep. Single points of rounded
-                // shapes tell no outline.
+                // Below an undercut, a vertex may be a little outside of the outline. Farther away, it belongs to another patch of its
+                // triangle. Single points of rounded shapes tell no outline.
                 let is_here = || {
                     let mut reaches = plane.directions.iter().zip(outline.reaches());
-                    reaches.all(|(direction, reach)| dot(*direction, from) <= reach + depth)
+                    reaches.all(|(direction, reach)| {
+                        dot(*direction, from) <= reach + depth.min(UNDERCUT * reach)
+                    })
                 };
                 if depth > -sides.radii && (sides.radii > 0.0 || is_here()) {
                     inner.farthest.add(plane, *corner, DEPTH_SHARE * depth, ());
@@ -241,6 +247,67 @@ fn inner_vertices(
     }
     inner
 }
+
+/// The sides of a contact.
+const A: usize = 0;
+const B: usize = 1;
+
+/// A plane of the other mesh above a vertex: how far it is along the patch's normal, and its own normal, which points out of the
+/// other mesh.
+#[derive(Clone, Copy)]
+struct Face {
+    length: f64,
+    normal: [f64; 3],
+}
+
+/// Planes with a lesser cosine to the patch's normal are walls.
+const LEAST_COSINE_OF_FACES: f64 = 0.25;
+
+/// Returns for each vertex the plane above it: that of the nearest triangle with which its own triangles are in contact. A wall counts
+/// only if there is no other one.
+fn faces_above(
+    vertices: &[[f64; 3]],
+    plane: &PatchPlane,
+    contacts: &Contacts<'_>,
+    side: usize,
+) -> Vec<Option<Face>> {
+    // Each with the square of its distance.
+    let mut faces = vec![[None::<(f64, Face)>; 2]; vertices.len()];
+    for (region, triangles, _) in contacts.iter() {
+        let (normal, sign) = if side == B { (region.normal_a, 1.0) } else { (region.normal_b, -1.0) };
+        let cosine = sign * dot(normal, plane.normal);
+        if cosine <= 0.0 {
+            continue;
+        }
+        for (vertex, [face, wall]) in vertices.iter().zip(&mut faces) {
+            if !triangles[side].contains(vertex) {
+                continue;
+            }
+            for point in region.points() {
+                let way = subtract(*point, *vertex);
+                let square = dot(way, way);
+                let held = if cosine >= LEAST_COSINE_OF_FACES { &mut *face } else { &mut *wall };
+                if held.is_none_or(|(least, _)| square < least) {
+                    *held = Some((square, Face { length: dot(normal, way) / cosine, normal }));
+                }
+            }
+        }
+    }
+    faces.into_iter().map(|[face, wall]| face.or(wall).map(|(_, face)| face)).collect()
+}
+
+/// Why a line is measured.
+#[derive(Clone, Copy, PartialEq)]
+enum LineKind {
+    /// It passes through the centre.
+    Center,
+    /// It passes just inside of the rim.
+    Rim,
+}
+
+/// How many times as long as others a length may be that is measured along a line. In a sliver between two walls, a line along the
+/// normal of a patch that also has a floor leaves it anywhere.
+const MAX_RATIO: f64 = 2.0;
 
 /// Measures how deep candidates are.
 struct Lines<'l, 's> {
@@ -260,10 +327,22 @@ impl Lines<'_, '_> {
         }
     }
 
-    /// Measures from a vertex of one mesh to the surface of the other one, which pushes it along the normal (1) or against it (-1).
-    fn add_vertex(&mut self, mesh: &PlacedShape<'_>, vertex: [f64; 3], sign: f64) -> Result<(), QueryError> {
+    /// Measures from a vertex of one mesh to the surface of the other one, which pushes it along the normal (1) or against it (-1). If
+    /// that is much farther than the plane above it, the vertex is in a sliver, and the plane is what counts.
+    fn add_vertex(
+        &mut self,
+        mesh: &PlacedShape<'_>,
+        vertex: [f64; 3],
+        face: Option<Face>,
+        sign: f64,
+    ) -> Result<(), QueryError> {
         let out = self.plane.normal.map(|x| sign * x);
         let mut met = self.way_out(mesh, vertex, out)?;
+        if let (Some((length, _)), Some(face)) = (met, face)
+            && length > MAX_RATIO * (face.length.max(0.0) + self.sides.radii)
+        {
+            met = Some((face.length.max(0.0), face.normal));
+        }
         if met.is_none() && self.sides.radii > 0.0 {
             let below = self.querier.first_of_core(mesh, vertex, out.map(|x| -x))?;
             met = below.filter(|(_, normal)| dot(*normal, out) > 0.0).map(|(t, normal)| (-t, normal));
@@ -277,7 +356,7 @@ impl Lines<'_, '_> {
 
     /// Measures the overlap on a line: from a point in B backwards out of B, and from there out of A; or, from a point in A, the other
     /// way around. The point may be on the surface of either mesh, so that rounding decides what it is in.
-    fn add_line(&mut self, through: [f64; 3], is_center: bool) -> Result<(), QueryError> {
+    fn add_line(&mut self, through: [f64; 3], kind: LineKind) -> Result<(), QueryError> {
         let (up, down) = (self.plane.normal, self.plane.normal.map(|x| -x));
         let along = |from: [f64; 3], length: f64, direction: [f64; 3]| {
             [0, 1, 2].map(|k| from[k] + length * direction[k])
@@ -300,15 +379,24 @@ impl Lines<'_, '_> {
         if let Some((middle, length, normal_a, normal_b)) = met {
             let mut mean = MeanNormal::new(self.plane);
             mean.add(normal_a, normal_b);
-            self.add(middle, length, if is_center { up } else { unit(mean.0) });
+            let deepest = self.deepest();
+            if kind == LineKind::Center {
+                self.add(middle, length, up);
+            } else if deepest <= 0.0 || length <= MAX_RATIO * deepest {
+                self.add(middle, length, unit(mean.0));
+            }
         }
         Ok(())
+    }
+
+    fn deepest(&self) -> f64 {
+        self.found.iter().fold(0.0, |most, of| most.max(of.point.depth))
     }
 
     /// Returns whether there is a point just outward of this one that is at least half as deep as the deepest one, so that measuring
     /// here would find none that is better. Of a box, these are its corners.
     fn has_deep_point_beyond(&self, near: [f64; 3]) -> bool {
-        let deepest = self.found.iter().fold(0.0_f64, |most, of| most.max(of.point.depth));
+        let deepest = self.deepest();
         let [x, y] = self.plane.place(near);
         let square = x * x + y * y;
         let is_beyond = |[p, q]: [f64; 2]| {
@@ -318,19 +406,22 @@ impl Lines<'_, '_> {
         deepest > 0.0 && self.found.iter().any(|of| of.point.depth >= 0.5 * deepest && is_beyond(of.place))
     }
 
-    /// Adds a point in which regions meet. It is on both surfaces, or between cores that are apart.
-    fn add_region_point(&mut self, contacts: &Contacts<'_>, vertex: usize) {
-        let mut mean = MeanNormal::new(self.plane);
+    /// Adds a point in which regions meet. It is on both surfaces, or between cores that are apart. Returns whether one of the surfaces
+    /// is a wall there: only beside a wall may the overlap be deep.
+    fn add_region_point(&mut self, contacts: &Contacts<'_>, vertex: usize) -> bool {
+        let (mut mean, mut is_at_wall) = (MeanNormal::new(self.plane), false);
         let mut nearest: Option<(&ContactRegion, [f64; 3])> = None;
         for (region, _, vertices) in contacts.iter() {
             if let Some(place) = vertices.iter().position(|other| *other == vertex) {
                 mean.add(region.normal_a, region.normal_b);
+                let cosines = [region.normal_a, region.normal_b].map(|normal| dot(normal, self.plane.normal));
+                is_at_wall |= cosines[0].min(-cosines[1]) < LEAST_COSINE_OF_FACES;
                 if nearest.is_none_or(|(other, _)| region.overlap > other.overlap) {
                     nearest = region.points().get(place).map(|point| (region, *point));
                 }
             }
         }
-        let Some((region, point)) = nearest else { return };
+        let Some((region, point)) = nearest else { return false };
         let normal = unit(mean.0);
         let gap = self.sides.radii - region.overlap;
         // The point between cores is nearer to the one with the lesser radius.
@@ -341,6 +432,7 @@ impl Lines<'_, '_> {
             // Not minus zero where they meet.
             self.add(middle, 0.0 - gap / cosine, normal);
         }
+        is_at_wall
     }
 
     /// Returns how far it is from a point in the core of a mesh to its surface, and the normal there; nothing if what is met first is

@@ -208,6 +208,38 @@ fn points_of_a_curved_patch_have_normals_of_their_own() {
     }
 }
 
+/// A box in a slot that is a little too narrow: its sides are in the walls, whose tops are far above it. What counts is the floor.
+#[test]
+fn walls_do_not_make_points_deep() {
+    let profile = [
+        [-5.0, -5.0],
+        [-5.0, 5.0],
+        [0.001, 5.0],
+        [0.001, 0.0],
+        [1.999, 0.0],
+        [1.999, 5.0],
+        [7.0, 5.0],
+        [7.0, -5.0],
+    ];
+    let mut slot = Vec::new();
+    for k in 0..profile.len() {
+        let ([x, z], [u, w]) = (profile[k], profile[(k + 1) % profile.len()]);
+        let [a, b, c, d] = [[x, -3.0, z], [u, -3.0, w], [u, 3.0, w], [x, 3.0, z]];
+        slot.extend([[a, b, c], [a, c, d]]);
+    }
+    for levels in [0, 4] {
+        let found =
+            points(&slot, &finer(block([0.0, -0.5, -0.1], [2.0, 0.5, 0.5]), levels), &Pose::IDENTITY, 8);
+        assert!(found.iter().all(|of| of.depth < 0.201), "{found:?}");
+        let deep: Vec<_> = found.into_iter().filter(|of| of.depth > 0.099 && of.normal[2] > 0.99).collect();
+        assert!(deep.len() >= 4, "{deep:?}");
+        for corner in [[0.0, -0.5], [0.0, 0.5], [2.0, -0.5], [2.0, 0.5]] {
+            let is_near = |of: &PatchPoint| (of.point[0] - corner[0]).hypot(of.point[1] - corner[1]) < 0.3;
+            assert!(deep.iter().any(is_near), "{corner:?} {deep:?}");
+        }
+    }
+}
+
 /// Both ends of the line of a point are on the surfaces, as far apart as the depth and the normals tell.
 #[test]
 fn lines_of_points_end_on_both_surfaces() {
