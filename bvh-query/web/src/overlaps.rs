@@ -115,12 +115,22 @@ pub fn contact_regions(a: &Mesh, b: &Mesh, at: &Float64Array, limit: u32) -> Ans
     })
 }
 
-/// First contact, number of contacts, centre, normal, length, area and depth of each patch, the parts of the regions, and the
-/// number of all contacts.
+/// First contact, number of contacts, centre, normal, length, area and depth of each patch, the parts of the regions, the number of
+/// all contacts, first point and number of points of each patch, and the points, their normals and depths.
 #[wasm_bindgen]
-pub fn patches(a: &Mesh, b: &Mesh, at: &Float64Array, tolerance: f64, limit: u32) -> Answer<Array> {
+pub fn patches(
+    a: &Mesh,
+    b: &Mesh,
+    at: &Float64Array,
+    tolerance: f64,
+    limit: u32,
+    most_points: u32,
+) -> Answer<Array> {
     let pose = pose(at, "pose")?;
-    let options = PatchOptions::new().tolerance(tolerance).max_contacts(limit as usize);
+    let options = PatchOptions::new()
+        .tolerance(tolerance)
+        .max_contacts(limit as usize)
+        .max_points(most_points as usize);
     with_querier(|querier| {
         let found = querier.patches(&a.shape, &b.shape, &pose, &options).map_err(refused)?;
         let of = || found.patches.iter();
@@ -135,6 +145,11 @@ pub fn patches(a: &Mesh, b: &Mesh, at: &Float64Array, tolerance: f64, limit: u32
             numbers(|patch| patch.depth),
             regions(&found.regions).into(),
             JsValue::from(found.total as f64),
+            ids(of().map(|patch| patch.first_point as u32)),
+            ids(of().map(|patch| patch.point_count as u32)),
+            points(found.points.iter().map(|of| of.point)),
+            points(found.points.iter().map(|of| of.normal)),
+            floats(found.points.iter().map(|of| of.depth)),
         ];
         Ok(parts.into_iter().collect())
     })

@@ -51,7 +51,7 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.relation(b, pose),
         () => a.contacts(b, pose),
         () => a.contactRegions(b, pose),
-        () => a.patches(b, pose, { tolerance: x, maxContacts: 1000 }),
+        () => a.patches(b, pose, { tolerance: x, maxContacts: 1000, maxPoints: 4 }),
         () => a.separation(b, pose, [x, y, z]),
         () => a.penetration(b, pose, { relativeGap: x, tolerance: y }),
         () => a.signedDistance(b, pose, { relativeGap: x, tolerance: y }),
@@ -178,6 +178,22 @@ export const cases = {
         equal([face.normal, face.count.length, face.regions.kind.includes(RegionKind.POLYGON)], [[1, 0, 0], 1, true]);
         equal(cube.patches(cube, corner, { maxContacts: 3 }).regions.kind.length, 3);
         equal(cube.patches(cube, at(9, 0, 0)).first, []);
+        // The sides of the cube are 2: it is 0.25 deep in a floor, with four corners.
+        const floor = cbvh.box([20, 20, 2]);
+        const pressed = floor.patches(cube, at(0.5, 0.25, 1.75), { maxPoints: 4 });
+        equal([pressed.firstPoint, pressed.pointCount, patches.pointCount, patches.points], [[0], [4], [0], []]);
+        pressed.pointDepths.forEach((depth) => near(depth, 0.25, 1e-9, "the depth of a corner"));
+        equal(pressed.pointNormals.length, 12);
+        const rounded = Array.from(pressed.points, (v) => Math.round(1e6 * v) / 1e6);
+        const places = [0, 3, 6, 9].map((k) => rounded.slice(k, k + 3)).sort((p, q) => p[0] - q[0] || p[1] - q[1]);
+        equal(places, [
+            [-0.5, -0.75, 0.875],
+            [-0.5, 1.25, 0.875],
+            [1.5, -0.75, 0.875],
+            [1.5, 1.25, 0.875],
+        ]);
+        const margin = floor.rounded(0.5).patches(cube, at(0, 0, 2.25), { tolerance: 5, maxPoints: 1 });
+        near(margin.pointDepths[0], -0.25, 1e-9, "minus the gap");
 
         equal([cube.openEdges().boundary, cube.openEdges().edges], [0, []]);
         // A tetrahedron whose last face has a corner of its own, a little off.
@@ -826,6 +842,10 @@ export const cases = {
             [() => new cbvh.Scene().signedDistance({ tolerance: -1 }), /^tolerance: expected a finite depth of at least 0/],
             [() => new cbvh.Scene().clashes({ tolerance: -1 }), /^tolerance: expected a finite depth of at least 0/],
             [() => cube.patches(cube, at(0, 0, 0), { tolerance: NaN }), /^tolerance: expected/],
+            [
+                () => cube.patches(cube, at(0, 0, 0), { maxPoints: 0.5 }),
+                "maxPoints: expected a whole number from 0 to 2^32 - 1, found 0.5",
+            ],
             [
                 () => cube.patches(cube, at(0, 0, 0), { maxContacts: -1 }),
                 "maxContacts: expected a whole number from 0 to 2^32 - 1, found -1",

@@ -275,6 +275,20 @@ export interface Patches {
     depth: Float64Array;
     /** The contacts of the first patch, of the second one, and so on. */
     regions: ContactRegions;
+    /** The place of the first contact point of each patch in `points`, of which each point has 3 numbers. */
+    firstPoint: Uint32Array;
+    /** The number of contact points of each patch; 0 without `maxPoints`. */
+    pointCount: Uint32Array;
+    /** Q contact points, those of the first patch, of the second one, and so on: the middles between both surfaces on lines along
+     * the patch's normal, or points of the curve in which they meet: length 3 Q. */
+    points: Float64Array;
+    /** The directions in which this mesh pushes the other one at each point, at length 1. They are those of the surfaces where the
+     * lines meet them, so points of a curved patch have different ones: length 3 Q. */
+    pointNormals: Float64Array;
+    /** How deep the meshes overlap at each point along its normal, at least 0. For meshes with a radius, it is about their cores:
+     * minus the gap between these where they are apart. So a radius serves as the margin of a simulator. If the radii are a
+     * part of the bodies, add their sum. */
+    pointDepths: Float64Array;
 }
 
 /** K pairs of triangles of one mesh that meet where they should not. */
@@ -481,9 +495,11 @@ export function regions(parts: unknown[], total: unknown): ContactRegions {
 }
 
 export function patches(parts: unknown[]): Patches {
-    const [first, count, center, normal, length, area, depth, contacts, total] = parts;
+    const [first, count, center, normal, length, area, depth, contacts, total, ...ofPoints] = parts;
+    const [firstPoint, pointCount, points, pointNormals, pointDepths] = ofPoints;
     const ofContacts = regions(contacts as unknown[], total);
-    return { first, count, center, normal, length, area, depth, regions: ofContacts } as Patches;
+    const ofPatches = { first, count, center, normal, length, area, depth, regions: ofContacts };
+    return { ...ofPatches, firstPoint, pointCount, points, pointNormals, pointDepths } as Patches;
 }
 
 export const selfContacts = ([triangles, kind]: unknown[]): SelfContacts => ({ triangles, kind }) as SelfContacts;
