@@ -615,5 +615,5 @@ def regions_of(found: tuple[Any, ...]) -> ContactRegions:
 
 def patches_of(found: tuple[Any, ...]) -> Patches:
     """What the compiled module tells of patches."""
-    *numbers, regions, points = found
-    return Patches(*numbers, regions_of(regions), *points)
+    regions: Any = regions_of(found[-2])
+    return Patches(*found[:-2] + (regions, *found[-1]))

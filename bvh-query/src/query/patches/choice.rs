@@ -12,7 +12,8 @@ pub struct PatchPoint {
     /// The middle between both surfaces on a line along the patch's normal, or a point of the curve in which they meet.
     pub point: [f64; 3],
     /// The direction in which A pushes B here, at length 1. It is the mean of the normals of A and, reversed, of B where the line
-    /// meets them, weighted by the squares of their cosines to the patch's normal; at its centre it is the patch's normal.
+    /// meets them, weighted by the squares of their cosines to the patch's normal. For a vertex it is that of the other mesh alone,
+    /// and at the patch's centre it is the patch's normal.
     pub normal: [f64; 3],
     /// How deep the meshes overlap here along `normal`: the length on the line times the cosine between `normal` and the patch's
     /// normal. For shapes with radii, it is about their cores: minus the gap where these are apart, which is at least minus the sum
