@@ -4,8 +4,8 @@
 //! parts are NaN and 0.
 
 use bvh_query::{
-    Clash, ClosestPoint, Contact, ContactRegion, Distance, MotionAnswer, Patches, Penetration, Pose, RayHit,
-    SignedDistance,
+    Clash, ClosestPoint, Contact, ContactRegion, Distance, Intersection, IntersectionSurface, MotionAnswer,
+    Patches, Penetration, Pose, RayHit, SignedDistance,
 };
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
@@ -197,17 +197,54 @@ pub(crate) fn signed_distances<'py>(
         .into_pyobject(to.py)
 }
 
-/// Class, relation, distance, point, and the parts of the depth.
+/// Volume and its error, areas of A and B, box, and the pierced thickness of A and B.
+pub(crate) fn intersections<'py>(
+    to: Answers<'py>,
+    of: impl Iterator<Item = Option<Intersection>> + Clone,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let numbers = |part: fn(Intersection) -> f64| to.values(of.clone().map(|of| of.map_or(f64::NAN, part)));
+    let boxes: Vec<f64> = of
+        .clone()
+        .flat_map(|of| of.and_then(|of| of.bounds).unwrap_or([[f64::NAN; 3]; 2]))
+        .flatten()
+        .collect();
+    let count = boxes.len() / 6;
+    let boxes = PyArray1::from_vec(to.py, boxes);
+    let boxes =
+        if to.one { boxes.reshape([2, 3])?.into_any() } else { boxes.reshape([count, 2, 3])?.into_any() };
+    (
+        numbers(|of| of.volume)?,
+        numbers(|of| of.volume_error)?,
+        numbers(|of| of.area_a)?,
+        numbers(|of| of.area_b)?,
+        boxes,
+        numbers(|of| of.pierced_a.unwrap_or(f64::NAN))?,
+        numbers(|of| of.pierced_b.unwrap_or(f64::NAN))?,
+    )
+        .into_pyobject(to.py)
+}
+
+/// Points, the corners of each loop, and the loops of each polygon.
+pub(crate) fn surface<'py>(py: Python<'py>, of: &IntersectionSurface) -> PyResult<Bound<'py, PyTuple>> {
+    let points = table(py, of.points.iter().copied())?;
+    (points, array(py, of.loops.iter().copied()), array(py, of.polygons.iter().copied())).into_pyobject(py)
+}
+
+/// Class, relation, distance, point, the parts of the depth, and those of the intersection or, if nobody asked for these, `None`.
 pub(crate) fn clashes<'py>(
     to: Answers<'py>,
     of: impl Iterator<Item = Clash> + Clone,
+    with_magnitudes: bool,
 ) -> PyResult<Bound<'py, PyTuple>> {
+    let shared = of.clone().map(|of| of.magnitudes);
+    let shared = with_magnitudes.then(|| intersections(to, shared)).transpose()?;
     (
         to.values(of.clone().map(|of| of.class as u8))?,
         to.values(of.clone().map(|of| of.relation as u8))?,
         to.values(of.clone().map(|of| of.distance))?,
         to.rows(of.clone().map(|of| of.point))?,
         penetrations(to, of.map(|of| of.depth))?,
+        shared,
     )
         .into_pyobject(to.py)
 }

@@ -43,6 +43,8 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         pairs::penetration,
         pairs::signed_distance,
         pairs::separation,
+        pairs::intersection,
+        pairs::intersection_surface,
         pairs::contact_regions,
         pairs::patches,
         pairs::self_contacts

@@ -178,22 +178,45 @@ pub(crate) fn signed_distance<'py>(
     answers::signed_distances(question.answers(), found.iter().copied().map(Some))
 }
 
-/// Clearance, tolerance, relative gap and the most visits of the search for a depth.
+#[pyfunction]
+pub(crate) fn intersection<'py>(asked: Asked<'py>) -> PyResult<Bound<'py, PyTuple>> {
+    let question = Question::new(&asked)?;
+    let found = question.ask(
+        |batch, poses| batch.intersections(poses),
+        |querier, [a, b], pose| querier.intersection(a, b, pose),
+    )?;
+    answers::intersections(question.answers(), found.iter().copied().map(Some))
+}
+
+#[pyfunction]
+pub(crate) fn intersection_surface<'py>(asked: Asked<'py>) -> PyResult<Bound<'py, PyAny>> {
+    let question = Question::new(&asked)?;
+    let found = question.ask(
+        |batch, poses| batch.intersection_surfaces(poses),
+        |querier, [a, b], pose| querier.intersection_surface(a, b, pose),
+    )?;
+    let py = question.py;
+    question.answers().lists(&found, |of| Ok(answers::surface(py, of)?.into_any()))
+}
+
+/// Clearance, tolerance, relative gap, the most visits of the search for a depth, and whether to measure what parts have in common.
 #[derive(FromPyObject)]
 pub(crate) struct ClashLimits<'py>(
     Bound<'py, PyAny>,
     Option<Bound<'py, PyAny>>,
     Bound<'py, PyAny>,
     Option<Bound<'py, PyAny>>,
+    Bound<'py, PyAny>,
 );
 
 impl ClashLimits<'_> {
     pub(crate) fn read(&self) -> PyResult<ClashOptions> {
-        let Self(clearance, tolerance, relative_gap, visits) = self;
+        let Self(clearance, tolerance, relative_gap, visits, magnitudes) = self;
         let options = ClashOptions::new()
             .clearance(number(clearance, "clearance")?)
             .relative_gap(number(relative_gap, "relative_gap")?)
-            .visits(limit(visits.as_ref(), "visits")? as u64);
+            .visits(limit(visits.as_ref(), "visits")? as u64)
+            .magnitudes(flag(magnitudes, "magnitudes")?);
         Ok(match tolerance {
             Some(tolerance) => options.tolerance(number(tolerance, "tolerance")?),
             None => options,
@@ -208,7 +231,7 @@ pub(crate) fn clash<'py>(asked: Asked<'py>, limits: ClashLimits<'py>) -> PyResul
         |batch, poses| batch.clashes(poses, &options),
         |querier, [a, b], pose| querier.clash(a, b, pose, &options),
     )?;
-    answers::clashes(question.answers(), found.iter().copied())
+    answers::clashes(question.answers(), found.iter().copied(), options.magnitudes)
 }
 
 #[pyfunction]

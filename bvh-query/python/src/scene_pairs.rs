@@ -78,7 +78,8 @@ pub(crate) fn scene_clashes<'py>(
         |scene| scene.clashes(&options),
         |state, found| found.into_iter().map(|row| (state.pair(row.pair), row.clash)).collect(),
     )?;
-    let clashes = answers::clashes(Answers { py, one: false }, found.iter().map(|row| row.1))?;
+    let clashes =
+        answers::clashes(Answers { py, one: false }, found.iter().map(|row| row.1), options.magnitudes)?;
     Ok((table(py, found.iter().map(|row| row.0))?, clashes))
 }
 

@@ -27,6 +27,22 @@ def opened():
     return cbvh.bake(vertices, faces[:-1])
 
 
+def block(*sides):
+    """A block around the origin."""
+    vertices, faces = cube()
+    return cbvh.bake(vertices * sides, faces)
+
+
+def volume_within(surface):
+    """The volume within polygons, by the divergence theorem: that of cones over fans of all loops."""
+    volume, first = 0.0, 0
+    for count in surface.loops:
+        corners = surface.points[first : first + count]
+        volume += np.linalg.det(np.stack([np.tile(corners[0], (count - 2, 1)), corners[1:-1], corners[2:]], axis=1)).sum() / 6
+        first += count
+    return volume
+
+
 def two_cubes(offset):
     """A cube around the origin and another one, as one mesh, which is not convex."""
     vertices, faces = cube()
@@ -292,7 +308,8 @@ class Depths(unittest.TestCase):
         self.assertEqual(str(found.kind[:0]), "[]")
         self.assertIn("OVERLAPPING", str(found.kind))
         parallel = self.cube.clash(self.cube, poses, clearance=0.25, tolerance=0.1, relative_gap=1e-3, parallel=True)
-        for one, other in zip((*found[:-1], *found.depth), (*parallel[:-1], *parallel.depth)):
+        self.assertIsNone(found.magnitudes)
+        for one, other in zip((*found[:4], *found.depth), (*parallel[:4], *parallel.depth)):
             np.testing.assert_array_equal(one, other)
         # Where the visits end the search, the bounds so far are the answer.
         spent = self.not_convex.clash(self.cube, shifts((0.96875, 0.125, 0)), tolerance=2.0**-10, relative_gap=0.01, visits=200)
@@ -303,6 +320,74 @@ class Depths(unittest.TestCase):
         # By default nothing is near, and the tolerance is a millionth of the side.
         by_default = self.cube.clash(self.cube, shifts((1.0625, 0, 0), (1 - 5e-7, 0.125, 0), (1 - 4e-6, 0.125, 0)))
         self.assertEqual(by_default.kind.tolist(), [kind.APART, kind.TOUCHING, kind.OVERLAPPING])
+
+    def test_what_blocks_have_in_common_is_known(self):
+        sides, offsets = np.array([1.5, 0.75, 0.5]), np.random.default_rng(9).uniform(-1.25, 1.25, (200, 3))
+        offsets[:2] = [[0.25, 0, 0], [3, 0, 0]]
+        other, poses = block(*sides), shifts(*offsets)
+        lo, hi = np.maximum(-0.5, offsets - sides / 2), np.minimum(0.5, offsets + sides / 2)
+        is_shared = np.all(lo < hi, axis=1)
+        self.assertTrue(20 < np.count_nonzero(is_shared) < 180)
+        x, y, z = np.where(is_shared[:, None], hi - lo, 0).T
+        for mesh, parallel in ((self.cube, False), (two_cubes([0, 0, 9]), True)):
+            found = mesh.intersection(other, poses, parallel=parallel)
+            self.assertTrue(np.all(np.abs(found.volume - x * y * z) <= found.volume_error + 1e-15))
+            self.assertTrue(np.all(found.volume_error <= 1e-12))
+            np.testing.assert_allclose(found.area_a + found.area_b, 2 * (x * y + y * z + z * x), atol=1e-14)
+            np.testing.assert_allclose(found.bounds[is_shared], np.stack([lo, hi], axis=1)[is_shared], atol=1e-15)
+            self.assertTrue(np.isnan(found.bounds[~is_shared]).all())
+            surfaces = mesh.intersection_surface(other, poses, parallel=parallel)
+            np.testing.assert_allclose([volume_within(of) for of in surfaces], x * y * z, atol=1e-14)
+            for number, pose in enumerate(poses[:50]):
+                for parts, one in ((found, mesh.intersection(other, pose)), (surfaces[number], mesh.intersection_surface(other, pose))):
+                    for several, part in zip(parts, one):
+                        np.testing.assert_array_equal(part, several[number] if parts is found else several)
+            of_clash = mesh.clash(other, poses, magnitudes=True, parallel=parallel)
+            has = ~np.isnan(of_clash.magnitudes.volume)
+            np.testing.assert_array_equal(has, is_shared)
+            for part, parts in zip(of_clash.magnitudes, found):
+                np.testing.assert_array_equal(part[has], parts[has])
+            self.assertFalse(np.any(of_clash.kind == cbvh.ClashClass.OVERLAPPING))
+        none = self.cube.intersection(other, np.zeros((0, 4, 4)))
+        self.assertEqual((none.volume.shape, none.bounds.shape), ((0,), (0, 2, 3)))
+        self.assertEqual(self.cube.intersection_surface(other, np.zeros((0, 4, 4))), [])
+        one, surface = self.cube.intersection(other, poses[0]), self.cube.intersection_surface(other, poses[0])
+        self.assertEqual((type(one.volume), type(one.pierced_a), one.bounds.shape), (float, float, (2, 3)))
+        self.assertEqual((surface.points.shape[1], surface.loops.dtype, surface.polygons.dtype), (3, np.uint32, np.uint32))
+        self.assertEqual((surface.loops.sum(), surface.polygons.sum()), (len(surface.points), len(surface.loops)))
+        # Flush faces enclose nothing, and blocks that fill each other have all in common.
+        flush = self.cube.intersection(block(1, 1, 1), shifts((1, 0.25, 0), (0, 0, 0)))
+        np.testing.assert_array_equal(flush.volume, [0, 1])
+
+    def test_a_pierced_plate_is_as_thick_as_it_is(self):
+        kind, (plate, rod) = cbvh.ClashClass, (block(4, 3, 0.25), block(0.5, 0.5, 2))
+        world = random_poses(11, 1, 3.0)[0]
+        # Where the rod passes through the plate, sticks in it, and takes a side of it along.
+        poses = shifts((1, 0.5, 0.25), (1, 0.5, 1.0625), (2, 0.5, 0.25))
+        clash = plate.clash(rod, poses, magnitudes=True)
+        self.assertEqual(clash.kind.tolist(), [kind.PIERCING, kind.PROTRUDING, kind.PROTRUDING])
+        np.testing.assert_allclose(clash.magnitudes.volume, [0.0625, 0.015625, 0.03125], rtol=1e-14)
+        np.testing.assert_array_equal(clash.magnitudes.pierced_a, [0.25, np.nan, np.nan])
+        self.assertTrue(np.isnan(clash.magnitudes.pierced_b).all())
+        np.testing.assert_array_equal(rod.intersection(plate, shifts((-1, -0.5, -0.25))).pierced_b, [0.25])
+        self.assertIs(plate.clash(rod, poses[0]).kind, kind.OVERLAPPING)
+        # Of parts without a depth, and of parts that are near, there are none.
+        for other, pose in ((opened(), shifts((1, 0.125, 0))[0]), (self.cube, shifts((1.125, 0, 0))[0])):
+            found = self.cube.clash(other, pose, clearance=0.25, magnitudes=True)
+            self.assertTrue(np.isnan(found.magnitudes.volume) and np.isnan(found.magnitudes.bounds).all())
+        # In a scene, boxes are along the axes of the world.
+        scene = cbvh.Scene()
+        scene.add(plate, world, name="plate")
+        scene.add(rod, world @ poses[0], name="rod")
+        corners = np.array([[x, y, z, 1] for x in (0.75, 1.25) for y in (0.25, 0.75) for z in (-0.125, 0.125)]) @ world[:3].T
+        for scene.parallel in (False, True):
+            pairs, found = scene.clashes(magnitudes=True)
+            self.assertEqual((pairs.tolist(), found.kind.tolist()), ([[0, 1]], [kind.PIERCING]))
+            np.testing.assert_allclose(found.magnitudes.bounds[0], [corners.min(axis=0), corners.max(axis=0)], atol=1e-12)
+            np.testing.assert_allclose(found.magnitudes.volume, [0.0625], rtol=1e-12)
+            np.testing.assert_allclose(found.magnitudes.pierced_a, [0.25], rtol=1e-12)
+        self.assertEqual(cbvh.Scene().clashes(magnitudes=True).clash.magnitudes.bounds.shape, (0, 2, 3))
+        self.assertIsNone(cbvh.Scene().clashes().clash.magnitudes)
 
     def test_numbers_are_checked(self):
         mesh, at, none = self.cube, np.eye(4), np.zeros((0, 4, 4))
@@ -329,6 +414,12 @@ class Depths(unittest.TestCase):
             (ValueError, "relative_gap: expected a finite part above 0, found 0", clash(relative_gap=0)),
             (TypeError, "clearance: expected a number, found str", clash(clearance="x")),
             (TypeError, "visits: expected a whole number or None, found float", clash(visits=1.5)),
+            (TypeError, "magnitudes: expected a bool, found str", clash(magnitudes="x")),
+            (TypeError, "other: expected a cbvh.Mesh", mesh.intersection, "x", at),
+            (ValueError, "poses: expected shape (4, 4) or (N, 4, 4), found (3, 4)", mesh.intersection_surface, mesh, at[:3]),
+            (ValueError, "expected closed objects, found object 0 open: ", opened().intersection, mesh, at),
+            (ValueError, "expected closed objects, found object 0 open: ", mesh.intersection_surface, opened(), at),
+            (ValueError, "topology", cbvh.bake(*cube(), topology=False).intersection, mesh, at),
             (ValueError, "visits: expected a whole number from 0 to 2^64 - 1, found -1", clash(visits=-1)),
             (ValueError, "tolerance: expected a finite depth", lambda: cbvh.Scene().clashes(tolerance=-1)),
             (TypeError, "other: expected a cbvh.Mesh", mesh.clash, "x", at),
@@ -445,10 +536,10 @@ class SameBits(unittest.TestCase):
                 scene.add(mesh, pose, name=name)
                 rows.append({"file": f"{'ab'[number % 2]}.cbvh", "name": name, "pose": pose[:3].ravel().tolist()})
             pathlib.Path(folder, "parts.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-            arguments = [COMMAND, "clash", "--manifest", "parts.jsonl", "--clearance", "1", "--tolerance", "0.01", "--json"]
+            arguments = [COMMAND, "clash", "--manifest", "parts.jsonl", "--clearance", "1", "--tolerance", "0.01", "--magnitudes", "--json"]
             asked = subprocess.run(arguments, cwd=folder, check=True, capture_output=True, text=True)
             rows = {(row["a"], row["b"]): row for row in json.loads(asked.stdout)["clashes"]}
-            pairs, found = scene.clashes(clearance=1, tolerance=0.01)
+            pairs, found = scene.clashes(clearance=1, tolerance=0.01, magnitudes=True)
             self.assertEqual(len(rows), len(pairs))
             for number, (pair, kind, depth) in enumerate(zip(pairs.tolist(), found.kind, np.array(found.depth[:2]).T)):
                 row = rows[tuple(f"{instance:02}" for instance in pair)]
@@ -457,6 +548,14 @@ class SameBits(unittest.TestCase):
                 np.testing.assert_array_equal(depth, known)
                 world = scene.pose(pair[0])
                 np.testing.assert_allclose(world[:3, :3] @ found.point[number] + world[:3, 3], row["point"], atol=1e-12)
+                if "volume" in row:
+                    shared = [part[number].tolist() for part in found.magnitudes]
+                    pierced = [math.nan if part is None else part for part in row["pierced"]]
+                    np.testing.assert_array_equal(shared[:4] + shared[5:], [row["volume"], row["volume_error"], *row["area"], *pierced])
+                    np.testing.assert_array_equal(shared[4], row["box"])
+                else:
+                    self.assertTrue(np.isnan(found.magnitudes.volume[number]))
+            self.assertTrue(0 < sum("volume" in row for row in rows.values()) < len(rows))
             self.assertGreater(len(set(found.kind.tolist())), 1)
 
 

@@ -15,6 +15,7 @@ use crate::query::depth::clash::{Clash, ClashOptions};
 use crate::query::depth::penetration::{Penetration, PenetrationOptions, Separation, unit};
 use crate::query::depth::signed_distance::SignedDistance;
 use crate::query::distance::Distance;
+use crate::query::intersection::{Intersection, IntersectionSurface};
 use crate::query::motion::{MotionAnswer, MotionOptions};
 use crate::query::options::check_distance;
 use crate::query::patches::{PatchOptions, Patches};
@@ -175,6 +176,24 @@ impl<'a> Batch<'a> {
     pub fn clashes(&self, poses: &[Pose], options: &ClashOptions) -> Result<Vec<Clash>, QueryError> {
         options.check()?;
         self.each(poses, |querier, _, pose| querier.clash(self.a, self.b, pose, options))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::intersection`] for each pose.
+    ///
+    /// # Errors
+    /// Returns the error of the first pose that fails.
+    pub fn intersections(&self, poses: &[Pose]) -> Result<Vec<Intersection>, QueryError> {
+        self.each(poses, |querier, _, pose| querier.intersection(self.a, self.b, pose))
+            .map_err(|(_, error)| error)
+    }
+
+    /// Answers [`Querier::intersection_surface`] for each pose.
+    ///
+    /// # Errors
+    /// Returns the error of the first pose that fails.
+    pub fn intersection_surfaces(&self, poses: &[Pose]) -> Result<Vec<IntersectionSurface>, QueryError> {
+        self.each(poses, |querier, _, pose| querier.intersection_surface(self.a, self.b, pose))
             .map_err(|(_, error)| error)
     }
 

@@ -54,25 +54,32 @@ fn batches_answer_about_overlaps_as_one_by_one() {
     let poses = poses(&mut Random::new(5), 48);
     let (depth, patch) =
         (PenetrationOptions::new().relative_gap(0.5), PatchOptions::new().max_contacts(20).max_points(6));
-    let clash = ClashOptions::new().clearance(0.5).tolerance(0.1);
+    let clash = ClashOptions::new().clearance(0.5).tolerance(0.1).magnitudes(true);
     let up = [0.0, 0.0, 2.0];
     let mut querier = Querier::new().unwrap();
     let (mut separations, mut penetrations, mut clashes) = (vec![], vec![], vec![]);
     let (mut regions, mut patches) = (vec![], vec![]);
+    let (mut intersections, mut surfaces) = (vec![], vec![]);
     for pose in &poses {
         separations.push(querier.separation(&a, &b, pose, up).unwrap());
         penetrations.push(querier.penetration(&a, &b, pose, &depth).unwrap());
         clashes.push(querier.clash(&a, &b, pose, &clash).unwrap());
+        intersections.push(querier.intersection(&a, &b, pose).unwrap());
+        surfaces.push(querier.intersection_surface(&a, &b, pose).unwrap());
         regions.push(querier.contact_regions(&a, &b, pose, 10).unwrap());
         patches.push(querier.patches(&a, &b, pose, &patch).unwrap());
     }
     assert!(penetrations.iter().any(|of| of.lower > 0.0) && regions.iter().any(|of| of.is_truncated()));
+    assert!(clashes.iter().any(|of| of.magnitudes.is_some()));
+    assert!(intersections.iter().any(|of| of.volume > 0.0) && surfaces.iter().any(|of| of.points.is_empty()));
     let batch = Batch::new(&a, &b).unwrap();
     for pool in &pools() {
         pool.install(|| {
             assert_eq!(batch.separations(&poses, up), Ok(separations.clone()));
             assert_eq!(batch.penetrations(&poses, &depth), Ok(penetrations.clone()));
             assert_eq!(batch.clashes(&poses, &clash), Ok(clashes.clone()));
+            assert_eq!(batch.intersections(&poses), Ok(intersections.clone()));
+            assert_eq!(batch.intersection_surfaces(&poses), Ok(surfaces.clone()));
             assert_eq!(batch.contact_regions(&poses, 10), Ok(regions.clone()));
             assert_eq!(batch.patches(&poses, &patch), Ok(patches.clone()));
         });

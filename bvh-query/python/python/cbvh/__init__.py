@@ -23,6 +23,7 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 `Mesh.signed_distance` is one number for both: the distance of meshes that are apart, and minus the depth of others. Scenes
 and robots have it for the pair whose number is the least.
 `Mesh.clash` and `Scene.clashes` tell parts that touch from parts that overlap, are near, contain each other or are there twice.
+`Mesh.intersection` measures what closed meshes have in common: volume, box, and how thick the one is where the other pierces it.
 `Mesh.contact_regions` and `Mesh.patches` tell where and how surfaces meet, and `Mesh.self_contacts` where a mesh meets
 itself.
 
@@ -57,6 +58,8 @@ from ._answers import (
     ClosestPoint,
     ContactRegions,
     Distance,
+    Intersection,
+    IntersectionSurface,
     MotionAnswer,
     MotionKind,
     OpenEdge,
@@ -104,6 +107,8 @@ __all__ = [
     "Distance",
     "FormatError",
     "InsideWarning",
+    "Intersection",
+    "IntersectionSurface",
     "Mesh",
     "Motion",
     "MotionAnswer",

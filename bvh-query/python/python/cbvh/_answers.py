@@ -102,6 +102,9 @@ class ClashClass(_Named):
     - ``DUPLICATED``: both are the same part in the same place, to within the tolerance.
     - ``UNDECIDED``: they have points in common, and the tolerance lies between the bounds found for their depth.
     - ``INTERSECTING``: they have points in common, and one is not closed, so that they have no depth.
+    - ``PIERCING``: their depth exceeds the tolerance, and one passes through the other. If magnitudes are asked for, parts that
+      overlap are this or ``PROTRUDING``.
+    - ``PROTRUDING``: their depth exceeds the tolerance, and neither passes through the other.
     """
 
     APART = 0
@@ -112,6 +115,8 @@ class ClashClass(_Named):
     DUPLICATED = 5
     UNDECIDED = 6
     INTERSECTING = 7
+    PIERCING = 8
+    PROTRUDING = 9
 
 
 class Distance(NamedTuple):
@@ -204,6 +209,43 @@ class SignedDistance(NamedTuple):
     is_spent: Any
 
 
+class Intersection(NamedTuple):
+    """What two meshes have in common, in mesh units. After N questions, each field has N elements or rows. Only the volume's error is
+    certified; all other numbers are rounded.
+
+    - ``volume``: the volume of the intersection. Shape () or (N,).
+    - ``volume_error``: the volume is off by at most this.
+    - ``area_a``: the area of the first mesh's surface inside the second.
+    - ``area_b``: the area of the second mesh's surface inside the first.
+    - ``bounds``: the least and the largest coordinates of the intersection, in the frame of the first mesh; NaN if it is empty. Shape
+      (2, 3) or (N, 2, 3).
+    - ``pierced_a``: how thick the first mesh is where the second passes through it; NaN if it does so nowhere. Shape () or (N,).
+    - ``pierced_b``: how thick the second mesh is where the first passes through it.
+    """
+
+    volume: Any
+    volume_error: Any
+    area_a: Any
+    area_b: Any
+    bounds: Floats
+    pierced_a: Any
+    pierced_b: Any
+
+
+class IntersectionSurface(NamedTuple):
+    """The boundary of what two meshes have in common: polygons, each of which lies in one triangle.
+
+    - ``points``: the corners of all polygons, loop by loop, in the frame of the first mesh and in mesh units. Shape (K, 3).
+    - ``loops``: the number of corners of each loop, uint32 of shape (L,). Seen from outside, an outline goes around counterclockwise and
+      holes clockwise, unless the mesh is turned inside out.
+    - ``polygons``: the number of loops of each polygon, its outline and then its holes. uint32 of shape (P,).
+    """
+
+    points: Floats
+    loops: NDArray[np.uint32]
+    polygons: NDArray[np.uint32]
+
+
 class Clash(NamedTuple):
     """How two parts of an assembly lie, and by how much. After N questions, each field has N elements or rows.
 
@@ -215,6 +257,8 @@ class Clash(NamedTuple):
       0 for parts that are apart. Shape (3,) or (N, 3).
     - ``depth``: for parts that touch, overlap or are undecided, the bounds of their depth, both 0 without a common point. For
       all others, and for parts that are not closed, its numbers are NaN.
+    - ``magnitudes``: None unless asked for. For parts that overlap, are undecided, contain each other or are duplicated, what they
+      have in common (`Intersection`). For all others, and for parts that are not closed, its numbers are NaN.
     """
 
     kind: Any
@@ -222,6 +266,7 @@ class Clash(NamedTuple):
     distance: Any
     point: Floats
     depth: Penetration
+    magnitudes: Intersection | None
 
 
 class ContactRegions(NamedTuple):
@@ -483,7 +528,8 @@ class SceneClashes(NamedTuple):
     """Pairs of instances that clash, and how.
 
     - ``pairs``: numbers of instances, A and B, shape (K, 2).
-    - ``clash``: the answers of `Mesh.clash`, arrays of K elements or rows, in A's frame.
+    - ``clash``: the answers of `Mesh.clash`, arrays of K elements or rows, in A's frame. Boxes of magnitudes alone are in the world and
+      along its axes.
     """
 
     pairs: NDArray[np.int64]
@@ -603,8 +649,9 @@ def named(kind: type[_Named], found: Any) -> Any:
 
 def clash_of(found: tuple[Any, ...]) -> Clash:
     """What the compiled module tells of clashes."""
-    kind, relation, distance, point, depth = found
-    return Clash(named(ClashClass, kind), named(Relation, relation), distance, point, Penetration(*depth))
+    kind, relation, distance, point, depth, shared = found
+    magnitudes = None if shared is None else Intersection(*shared)
+    return Clash(named(ClashClass, kind), named(Relation, relation), distance, point, Penetration(*depth), magnitudes)
 
 
 def regions_of(found: tuple[Any, ...]) -> ContactRegions:

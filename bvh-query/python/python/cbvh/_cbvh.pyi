@@ -54,6 +54,8 @@ __all__ = [
     "first_hits",
     "ground_core",
     "height_field_core",
+    "intersection",
+    "intersection_surface",
     "is_free",
     "segment_core",
     "segment_hits",
@@ -271,8 +273,8 @@ class Scene:
 
 # Two meshes, poses of the second in the frame of the first, and whether to use all cores.
 _Asked = tuple[Mesh, Mesh, ArrayLike, bool]
-# Clearance, tolerance, relative gap, and the most visits of the search for a depth.
-_ClashLimits = tuple[float, float | None, float, int | None]
+# Clearance, tolerance, relative gap, the most visits of the search for a depth, and whether to measure what parts have in common.
+_ClashLimits = tuple[float, float | None, float, int | None, bool]
 # A mesh, its pose, and whether to use all cores; or a scene.
 _Of = tuple[Mesh, ArrayLike | None, bool] | Scene
 
@@ -299,6 +301,8 @@ def signed_distance(
     asked: _Asked, relative_gap: float, tolerance: float | None, budget: int | None
 ) -> _Parts: ...
 def clash(asked: _Asked, limits: _ClashLimits) -> _Parts: ...
+def intersection(asked: _Asked) -> _Parts: ...
+def intersection_surface(asked: _Asked) -> Any: ...
 def separation(asked: _Asked, direction: ArrayLike) -> _Parts: ...
 def contact_regions(asked: _Asked, most: int | None) -> Any: ...
 def patches(

@@ -354,10 +354,12 @@ class Scene:
         tolerance: float | None = None,
         relative_gap: float = 0.1,
         visits: int | None = 1 << 20,
+        magnitudes: bool = False,
     ) -> SceneClashes:
         """All pairs that are near each other, touch, overlap, contain each other or are duplicates, with how they lie. Pairs
-        that are apart are left out. Arguments are those of `Mesh.clash`."""
-        pairs, clash = _cbvh.scene_clashes(self._scene, (clearance, tolerance, relative_gap, visits))
+        that are apart are left out. Arguments are those of `Mesh.clash`. The boxes of ``magnitudes`` are in the world, along its
+        axes."""
+        pairs, clash = _cbvh.scene_clashes(self._scene, (clearance, tolerance, relative_gap, visits, magnitudes))
         return SceneClashes(pairs, clash_of(clash))
 
     def contacts(self) -> SceneContacts:
