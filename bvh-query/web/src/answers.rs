@@ -1,6 +1,8 @@
 //! Makes arrays from answers: one array per field, in the order in which `ts/answers.ts` names them.
 
-use bvh_query::{Clash, ClosestPoint, Contact, Distance, Penetration, Pose, RayHit, SignedDistance};
+use bvh_query::{
+    Clash, ClosestPoint, Contact, Distance, Intersection, Penetration, Pose, RayHit, SignedDistance,
+};
 use js_sys::{Array, Float64Array, Uint8Array, Uint32Array};
 use wasm_bindgen::JsValue;
 
@@ -97,14 +99,34 @@ pub(crate) fn signed_distances(of: &[SignedDistance]) -> Array {
     .collect()
 }
 
-/// Class, relation, distance, point and parts of the depth.
-pub(crate) fn clashes(of: &[Clash]) -> Array {
+/// Volume and its error, areas of A and B, box, and the pierced thickness of A and B. NaN for what there is not.
+pub(crate) fn intersections<'a>(of: impl Iterator<Item = Option<&'a Intersection>>) -> Array {
+    let found: Vec<Option<&Intersection>> = of.collect();
+    let numbers = |part: fn(&Intersection) -> f64| floats(found.iter().map(|of| of.map_or(f64::NAN, part)));
+    let boxes = found.iter().map(|of| of.and_then(|of| of.bounds).unwrap_or([[f64::NAN; 3]; 2]));
+    [
+        numbers(|of| of.volume),
+        numbers(|of| of.volume_error),
+        numbers(|of| of.area_a),
+        numbers(|of| of.area_b),
+        points(boxes.flatten()),
+        numbers(|of| of.pierced_a.unwrap_or(f64::NAN)),
+        numbers(|of| of.pierced_b.unwrap_or(f64::NAN)),
+    ]
+    .into_iter()
+    .collect()
+}
+
+/// Class, relation, distance, point, parts of the depth and, if they were asked for, those of the intersection.
+pub(crate) fn clashes(of: &[Clash], with_magnitudes: bool) -> Array {
+    let shared = with_magnitudes.then(|| intersections(of.iter().map(|of| of.magnitudes.as_ref())));
     [
         small(of.iter().map(|of| of.class as u8)).into(),
         small(of.iter().map(|of| of.relation as u8)).into(),
         floats(of.iter().map(|of| of.distance)),
         points(of.iter().map(|of| of.point)),
         penetrations(of.iter().map(|of| of.depth.as_ref())).into(),
+        shared.into(),
     ]
     .into_iter()
     .collect()

@@ -1,6 +1,8 @@
 //! Where and how deep two meshes overlap, how far apart they are if they do not, and where a mesh meets itself.
 
-use crate::answers::{clashes, contacts, floats, ids, penetrations, points, signed_distances, small};
+use crate::answers::{
+    clashes, contacts, floats, ids, intersections, penetrations, points, signed_distances, small,
+};
 use crate::arguments::{Answer, pose, refused, rows, same_count, with_querier};
 use crate::mesh::Mesh;
 use crate::pairs::ask;
@@ -67,16 +69,36 @@ pub(crate) fn clash_options(
     tolerance: Option<f64>,
     relative_gap: Option<f64>,
     visits: Option<u32>,
+    magnitudes: bool,
 ) -> ClashOptions {
-    let mut options = ClashOptions::new().clearance(clearance);
+    let mut options = ClashOptions::new().clearance(clearance).magnitudes(magnitudes);
     options.tolerance = tolerance;
     options.relative_gap = relative_gap.unwrap_or(options.relative_gap);
     options.visits = visits.map_or(options.visits, u64::from);
     options
 }
 
+/// The parts of intersections.
+#[wasm_bindgen]
+pub fn intersection(a: &Mesh, b: &Mesh, poses: &Float64Array) -> Answer<Array> {
+    let found = ask([a, b], poses, |querier, [a, b], pose| querier.intersection(a, b, pose))?;
+    Ok(intersections(found.iter().map(Some)))
+}
+
+/// Points, the number of corners of each loop, and the number of loops of each polygon.
+#[wasm_bindgen(js_name = intersectionSurface)]
+pub fn intersection_surface(a: &Mesh, b: &Mesh, at: &Float64Array) -> Answer<Array> {
+    let pose = pose(at, "pose")?;
+    with_querier(|querier| {
+        let found = querier.intersection_surface(&a.shape, &b.shape, &pose).map_err(refused)?;
+        let counts = [found.loops, found.polygons].map(|counts| ids(counts.into_iter()));
+        Ok([points(found.points.into_iter())].into_iter().chain(counts).collect())
+    })
+}
+
 /// The parts of clashes.
 #[wasm_bindgen]
+#[expect(clippy::too_many_arguments, reason = "they are what JavaScript passes, one by one")]
 pub fn clash(
     a: &Mesh,
     b: &Mesh,
@@ -85,9 +107,11 @@ pub fn clash(
     tolerance: Option<f64>,
     relative_gap: Option<f64>,
     visits: Option<u32>,
+    magnitudes: bool,
 ) -> Answer<Array> {
-    let options = clash_options(clearance, tolerance, relative_gap, visits);
-    Ok(clashes(&ask([a, b], poses, |querier, [a, b], pose| querier.clash(a, b, pose, &options))?))
+    let options = clash_options(clearance, tolerance, relative_gap, visits, magnitudes);
+    let found = ask([a, b], poses, |querier, [a, b], pose| querier.clash(a, b, pose, &options))?;
+    Ok(clashes(&found, magnitudes))
 }
 
 /// Object and triangle of A and of B, kind, number of points, points, normals of A and of B, error and overlap.

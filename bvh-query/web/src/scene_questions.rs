@@ -81,11 +81,12 @@ impl Scene {
         tolerance: Option<f64>,
         relative_gap: Option<f64>,
         visits: Option<u32>,
+        magnitudes: bool,
     ) -> Answer<Array> {
-        let options = clash_options(clearance, tolerance, relative_gap, visits);
+        let options = clash_options(clearance, tolerance, relative_gap, visits, magnitudes);
         let found = self.ask(|scene| scene.clashes(&options))?;
         let of_pairs: Vec<Clash> = found.iter().map(|found| found.clash).collect();
-        Ok(beside(found.iter().map(|found| self.pair(found.pair)), clashes(&of_pairs).into()))
+        Ok(beside(found.iter().map(|found| self.pair(found.pair)), clashes(&of_pairs, magnitudes).into()))
     }
 
     /// The nearest pair, if there are pairs, and its distance.

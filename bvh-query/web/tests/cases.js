@@ -55,7 +55,8 @@ function questions(cbvh, a, b, pose, [x, y, z, w, v, u]) {
         () => a.separation(b, pose, [x, y, z]),
         () => a.penetration(b, pose, { relativeGap: x, tolerance: y }),
         () => a.signedDistance(b, pose, { relativeGap: x, tolerance: y }),
-        () => a.clash(b, pose, { clearance: x, tolerance: y, relativeGap: z, visits: 1000 }),
+        () => a.clash(b, pose, { clearance: x, tolerance: y, relativeGap: z, visits: 1000, magnitudes: true }),
+        () => [a.intersection(b, pose), a.intersectionSurface(b, pose)],
         () => a.selfContacts(),
         () => a.openEdges(),
         () => a.motion(b, Motion.between(at(x, y, z), pose), { clearance: w, tolerance: v }),
@@ -366,6 +367,66 @@ export const cases = {
         equal([clashes.clash.depth.upper[0], clashes.clash.point.subarray(0, 3)], [alone.depth.upper, alone.point]);
         equal(scene.clashes().clash.relation, [Relation.TOUCHING, Relation.TOUCHING, Relation.TOUCHING]);
         equal(new Scene().clashes(), { pairs: [], clash: cube.clashEach(cube, []) });
+    },
+
+    "boxes have known volumes in common": (cbvh) => {
+        const { box, ClashClass, Mesh, Scene } = cbvh;
+        const [a, b] = [box([2, 4, 4]), box([1, 3, 1])];
+        const way = [-3, -1.5, -1.25, -0.75, 0, 0.375, 1.375, 2];
+        const poses = way.flatMap((x) => at(x, 0.25, 2));
+        const all = a.intersectionEach(b, poses);
+        const volumeOf = ({ points, loops }) => {
+            // By the divergence theorem: cones over fans of all loops.
+            let [sum, first] = [0, 0];
+            const corner = (place) => points.subarray(3 * place, 3 * place + 3);
+            for (const count of loops) {
+                for (let k = 1; k + 1 < count; k++) {
+                    const [p, q, r] = [first, first + k, first + k + 1].map(corner);
+                    sum += p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) + p[2] * (q[0] * r[1] - q[1] * r[0]);
+                }
+                first += count;
+            }
+            return sum / 6;
+        };
+        way.forEach((x, k) => {
+            const [lo, hi] = [Math.max(-1, x - 0.5), Math.min(1, x + 0.5)];
+            const side = Math.max(hi - lo, 0);
+            const found = a.intersection(b, at(x, 0.25, 2));
+            ok(Math.abs(found.volume - side * 1.5) <= found.volumeError && found.volumeError < 1e-11, `the volume at ${x}`);
+            const area = side > 0 ? 2 * (side * 3 + side * 0.5 + 1.5) : 0;
+            ok(Math.abs(found.areaA + found.areaB - area) < 1e-12, `the area at ${x}`);
+            equal(found.bounds, side > 0 ? [lo, -1.25, 1.5, hi, 1.75, 2] : undefined);
+            equal([found.piercedA, found.piercedB], [undefined, undefined]);
+            equal([all.volume[k], all.volumeError[k], all.areaA[k], all.areaB[k]], [found.volume, found.volumeError, found.areaA, found.areaB]);
+            equal(Number.isNaN(all.bounds[6 * k]), side === 0);
+            const surface = a.intersectionSurface(b, at(x, 0.25, 2));
+            ok(Math.abs(volumeOf(surface) - side * 1.5) < 1e-12, `the surface at ${x}`);
+            equal(surface.loops.reduce((sum, count) => sum + count, 0), surface.points.length / 3);
+            equal(surface.polygons.reduce((sum, count) => sum + count, 0), surface.loops.length);
+        });
+        equal([all.bounds.length, all.piercedA.length, a.intersectionEach(b, []).volume], [48, 8, []]);
+        // A rod through a plate pierces it by its thickness, and one that sticks in it does not.
+        const [plate, rod] = [box([4, 3, 0.25]), box([0.5, 0.5, 2])];
+        for (const [z, name, volume, pierced] of [[0.25, "PIERCING", 0.0625, 0.25], [1.0625, "PROTRUDING", 0.015625, undefined]]) {
+            const found = plate.clash(rod, at(1, 0.5, z), { magnitudes: true });
+            equal([ClashClass[found.kind], found.magnitudes.piercedA, found.magnitudes.piercedB], [name, pierced, undefined]);
+            ok(Math.abs(found.magnitudes.volume - volume) < 1e-14, `a volume of ${volume}`);
+            equal(found.magnitudes, plate.intersection(rod, at(1, 0.5, z)));
+            equal(rod.intersection(plate, at(-1, -0.5, -z)).piercedB, pierced);
+            equal([plate.clash(rod, at(1, 0.5, z)).kind, plate.clash(rod, at(1, 0.5, z)).magnitudes], [ClashClass.OVERLAPPING, undefined]);
+        }
+        // Of parts that are near, and of those that are not closed, there are none.
+        const [cube, open] = [cubeOf(cbvh), Mesh.bake(CUBE, CUBE_FACES.slice(3))];
+        equal(cube.clash(cube, at(2.125, 0.25, 0), { clearance: 0.25, magnitudes: true }).magnitudes, undefined);
+        equal(cube.clash(open, at(1.5, 0.25, 0.125), { magnitudes: true }).magnitudes, undefined);
+        // In a scene, boxes are in the world.
+        const scene = new Scene();
+        scene.add(plate, at(10, 0, 0));
+        scene.add(rod, at(11, 0.5, 0.25));
+        const { pairs, clash } = scene.clashes({ magnitudes: true });
+        equal([pairs, [...clash.kind], clash.magnitudes.piercedA], [[0, 1], [ClashClass.PIERCING], [0.25]]);
+        equal(clash.magnitudes.bounds, [10.75, 0.25, -0.125, 11.25, 0.75, 0.125]);
+        equal(scene.clashes().clash.magnitudes, undefined);
     },
 
     "a baked cube answers every question about motions": (cbvh) => {
@@ -836,6 +897,10 @@ export const cases = {
                 () => cube.clash(cube, at(0, 0, 0), { visits: 0.5 }),
                 "visits: expected a whole number from 0 to 2^32 - 1, found 0.5",
             ],
+            [() => cube.clash(cube, at(0, 0, 0), { magnitudes: 1 }), "magnitudes: expected a boolean, found a number"],
+            [() => cube.intersection(gone, at(0, 0, 0)), "other: expected a Mesh in use, found one that was freed"],
+            [() => cube.intersection(Mesh.bake(CUBE, CUBE_FACES.slice(3)), at(0, 0, 0)), /expected closed objects, found object 0 open/],
+            [() => cube.intersectionSurface(cube, [1, 2]), /^pose/],
             [() => cube.clash(gone, at(0, 0, 0)), "other: expected a Mesh in use, found one that was freed"],
             [() => scene.signedDistance({ relativeGap: 0 }), /^relative_gap: expected a finite part above 0/],
             [() => scene.signedDistance({ tolerance: "1" }), "tolerance: expected a number, found a string"],

@@ -197,6 +197,52 @@ export enum ClashClass {
     UNDECIDED = 6,
     /** They have points in common, and one is not closed, so that they have no depth. */
     INTERSECTING = 7,
+    /** Their depth exceeds the tolerance, and one passes through the other. If magnitudes are asked for, parts that overlap are this
+     * or `PROTRUDING`. */
+    PIERCING = 8,
+    /** Their depth exceeds the tolerance, and neither passes through the other. */
+    PROTRUDING = 9,
+}
+
+/** What two meshes have in common, in mesh units. Only the error of the volume is certified; all other numbers are rounded. */
+export interface Intersection {
+    /** The volume of the intersection. */
+    volume: number;
+    /** The volume is off by at most this. */
+    volumeError: number;
+    /** The area of the first mesh's surface inside the other. */
+    areaA: number;
+    /** The area of the other mesh's surface inside the first. */
+    areaB: number;
+    /** The least coordinates of the intersection and then the largest, in the frame of the first mesh: length 6; `undefined` if it is
+     * empty. */
+    bounds: Float64Array | undefined;
+    /** How thick the first mesh is where the other passes through it; `undefined` if it does so nowhere. */
+    piercedA: number | undefined;
+    /** How thick the other mesh is where the first passes through it. */
+    piercedB: number | undefined;
+}
+
+/** N answers of the type `Intersection`: numbers of length N, and boxes of length 6 N. What there is not is NaN. */
+export interface Intersections {
+    volume: Float64Array;
+    volumeError: Float64Array;
+    areaA: Float64Array;
+    areaB: Float64Array;
+    bounds: Float64Array;
+    piercedA: Float64Array;
+    piercedB: Float64Array;
+}
+
+/** The boundary of what two meshes have in common: P polygons, each of which lies in one triangle. */
+export interface IntersectionSurface {
+    /** The corners of all polygons, loop by loop, in the frame of the first mesh: three numbers for each. */
+    points: Float64Array;
+    /** The number of corners of each loop. Seen from outside, an outline goes around counterclockwise and holes clockwise, unless the
+     * mesh is turned inside out. */
+    loops: Uint32Array;
+    /** The number of loops of each polygon, its outline and then its holes: length P. */
+    polygons: Uint32Array;
 }
 
 /** How two parts of an assembly lie, and by how much. Lengths are in mesh units. */
@@ -214,9 +260,13 @@ export interface Clash {
     /** For parts that touch, overlap or are undecided: the bounds of their depth, both 0 without a common point. Parts that are not
      * closed have none. */
     depth: Penetration | undefined;
+    /** For closed parts that overlap, are undecided, contain each other or are duplicated, if magnitudes were asked for: what they have
+     * in common. */
+    magnitudes: Intersection | undefined;
 }
 
-/** N answers of the type `Clash`. Where there is no depth, the numbers of `depth` are NaN and 0. */
+/** N answers of the type `Clash`. Where there is no depth, the numbers of `depth` are NaN and 0, and where nothing is measured, those of
+ * `magnitudes` are NaN. */
 export interface Clashes {
     /** Numbers of `ClashClass`. */
     kind: Uint8Array;
@@ -226,6 +276,8 @@ export interface Clashes {
     /** Length 3 N. */
     point: Float64Array;
     depth: Penetrations;
+    /** `undefined` unless they were asked for. */
+    magnitudes: Intersections | undefined;
 }
 
 /** Where K pairs of triangles in contact meet, in the frame of the first mesh and in mesh units. */
@@ -424,7 +476,7 @@ export interface SceneRelations {
 export interface SceneClashes {
     /** Numbers of instances, A and B of each pair: length 2 K. */
     pairs: Uint32Array;
-    /** The answers of `Mesh.clash`, in A's frame. */
+    /** The answers of `Mesh.clash`, in A's frame. Boxes of magnitudes alone are in the world and along its axes. */
     clash: Clashes;
 }
 
@@ -486,8 +538,18 @@ export const signedDistances = (parts: unknown[]): SignedDistances => {
     return { lower, upper, normal, pointA, pointB, translation, isSigned, isSpent } as SignedDistances;
 };
 
-export const clashes = ([kind, relation, distance, point, depth]: unknown[]): Clashes =>
-    ({ kind, relation, distance, point, depth: penetrations(depth as unknown[]) }) as Clashes;
+export const intersections = (parts: unknown[]): Intersections => {
+    const [volume, volumeError, areaA, areaB, bounds, piercedA, piercedB] = parts;
+    return { volume, volumeError, areaA, areaB, bounds, piercedA, piercedB } as Intersections;
+};
+
+export const intersectionSurface = ([points, loops, polygons]: unknown[]): IntersectionSurface =>
+    ({ points, loops, polygons }) as IntersectionSurface;
+
+export const clashes = ([kind, relation, distance, point, depth, shared]: unknown[]): Clashes => {
+    const magnitudes = shared === undefined ? undefined : intersections(shared as unknown[]);
+    return { kind, relation, distance, point, depth: penetrations(depth as unknown[]), magnitudes } as Clashes;
+};
 
 export function regions(parts: unknown[], total: unknown): ContactRegions {
     const [triangles, kind, count, points, normalA, normalB, error, overlap] = parts;
@@ -504,11 +566,13 @@ export function patches(parts: unknown[]): Patches {
 
 export const selfContacts = ([triangles, kind]: unknown[]): SelfContacts => ({ triangles, kind }) as SelfContacts;
 
+/** A number, or `undefined` for one that stands for none. */
+const known = (value: number | undefined) => (Number.isNaN(value) ? undefined : value);
+
 const OPEN_EDGE_KINDS: OpenEdgeKind[] = ["boundary", "flipped", "crowded"];
 
 export function openEdges(of: unknown[]): OpenEdges {
     const [counts, numbers, triangles, places, text] = of as [Float64Array, Uint32Array, Uint32Array, Float64Array, string];
-    const known = (length: number | undefined) => (Number.isNaN(length) ? undefined : length);
     const edges: OpenEdge[] = [];
     let first = 0;
     for (let number = 0; 3 * number < numbers.length; number++) {
@@ -567,15 +631,30 @@ export const onlySignedDistance = (of: SignedDistances): SignedDistance => ({
     isSpent: of.isSpent[0] === 1,
 });
 
+/** Takes the only element of an answer with one intersection. */
+export function onlyIntersection({ bounds, piercedA, piercedB, ...of }: Intersections): Intersection {
+    return {
+        volume: of.volume[0] as number,
+        volumeError: of.volumeError[0] as number,
+        areaA: of.areaA[0] as number,
+        areaB: of.areaB[0] as number,
+        bounds: Number.isNaN(bounds[0]) ? undefined : bounds,
+        piercedA: known(piercedA[0]),
+        piercedB: known(piercedB[0]),
+    };
+}
+
 /** Takes the only element of an answer with one clash. */
-export function onlyClash({ kind, relation, distance, point, depth }: Clashes): Clash {
+export function onlyClash({ kind, relation, distance, point, depth, magnitudes }: Clashes): Clash {
     const only = onlyPenetration(depth);
+    const shared = magnitudes && onlyIntersection(magnitudes);
     return {
         kind: kind[0] as ClashClass,
         relation: relation[0] as Relation,
         distance: distance[0] as number,
         point,
         depth: Number.isNaN(only.lower) ? undefined : only,
+        magnitudes: Number.isNaN(shared?.volume) ? undefined : shared,
     };
 }
 

@@ -8,6 +8,9 @@ import type {
     ContactRegions,
     Distance,
     Distances,
+    Intersection,
+    IntersectionSurface,
+    Intersections,
     MotionAnswer,
     MotionAnswers,
     OpenEdges,
@@ -25,6 +28,7 @@ import type {
 import {
     bytes,
     described,
+    flag,
     float,
     floats,
     instance,
@@ -101,6 +105,9 @@ export interface ClashOptions {
     /** The most visits of nodes and triangles that the search for the depth of a pair may make, from 0 to 2^32 - 1. 2^20 by
      * default. */
     visits?: number;
+    /** Whether to measure what closed parts have in common, as `Mesh.intersection` does, and to divide overlapping ones into piercing and
+     * protruding ones. False by default. */
+    magnitudes?: boolean;
 }
 
 /** How contacts are joined into patches. */
@@ -173,10 +180,13 @@ export function depthLimits(options: PenetrationOptions): [number?, number?] {
 }
 
 /** Reads what counts as a clash. */
-export function clashLimits(options: ClashOptions): [number, number?, number?, number?] {
-    const { clearance = 0, tolerance, relativeGap, visits } = options;
+export function clashLimits(
+    options: ClashOptions,
+): [number, number | undefined, number | undefined, number | undefined, boolean] {
+    const { clearance = 0, tolerance, relativeGap, visits, magnitudes = false } = options;
     const [depth, gap] = [optional(tolerance, "tolerance"), optional(relativeGap, "relativeGap")];
-    return [float(clearance, "clearance"), depth, gap, visits === undefined ? undefined : integer(visits, "visits")];
+    const most = visits === undefined ? undefined : integer(visits, "visits");
+    return [float(clearance, "clearance"), depth, gap, most, flag(magnitudes, "magnitudes")];
 }
 
 /** Reads the greatest parameters of rays. */
@@ -493,6 +503,36 @@ export class Mesh extends Handle<raw.Mesh> {
     clashEach(other: Mesh, poses: Numbers, options: ClashOptions = {}): Clashes {
         const limits = clashLimits(options);
         return answers.clashes(this.#pair(other, poses, (a, b, array) => raw.clash(a, b, array, ...limits)));
+    }
+
+    /**
+     * How much do closed meshes have in common? The volume of the intersection, with a certified error, its box, the area of each
+     * surface in it, and how thick the meshes are where they pierce each other.
+     *
+     * A mesh is pierced where the other one passes all the way through it: the other one goes in through one part of its surface and out
+     * through another one, and the thickness is the least distance between two such parts. It is not pierced where the other one only
+     * reaches into it, or takes a corner of it along. A common face of flush meshes encloses nothing. Each place counts as often as the
+     * surfaces wind around it: where parts of one mesh overlap, unite them before baking. Radii are left out. Throws if a mesh is not
+     * closed, or was baked without topology.
+     */
+    intersection(other: Mesh, pose: Numbers): Intersection {
+        return answers.onlyIntersection(this.intersectionEach(other, onePose(pose)));
+    }
+
+    /** `intersection` for N poses. */
+    intersectionEach(other: Mesh, poses: Numbers): Intersections {
+        return answers.intersections(this.#pair(other, poses, (a, b, array) => raw.intersection(a, b, array)));
+    }
+
+    /**
+     * What bounds the part that closed meshes have in common? Polygons for those who draw it: the parts of this mesh's triangles inside
+     * the other one, and then those of the other mesh's triangles inside this one. Points are rounded. Polygons that are next to each
+     * other have the same points, so that no gap is between them.
+     */
+    intersectionSurface(other: Mesh, pose: Numbers): IntersectionSurface {
+        return answers.intersectionSurface(
+            this.#pair(other, onePose(pose), (a, b, array) => raw.intersectionSurface(a, b, array)),
+        );
     }
 
     /**
