@@ -740,7 +740,12 @@ enum {
     /* They have points in common, and the tolerance lies between the bounds that were found for their depth. */
     CBVH_CLASH_UNDECIDED = 6,
     /* They have points in common, and one is not closed, so that they have no depth. */
-    CBVH_CLASH_INTERSECTING = 7
+    CBVH_CLASH_INTERSECTING = 7,
+    /* Their depth exceeds the tolerance, and one passes through the other. Where clashes are measured, parts that overlap are
+     * this or CBVH_CLASH_PROTRUDING. */
+    CBVH_CLASH_PIERCING = 8,
+    /* Their depth exceeds the tolerance, and neither passes through the other. */
+    CBVH_CLASH_PROTRUDING = 9
 };
 
 /* How two parts lie, and by how much, in mesh units. */
@@ -782,6 +787,46 @@ typedef struct cbvh_clash_options {
  * question. */
 cbvh_status cbvh_clashes(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                          const cbvh_clash_options *options, cbvh_clash *answers);
+
+/* What two meshes have in common, in mesh units. Only the error of the volume is certain; all other numbers are rounded. */
+typedef struct cbvh_intersection {
+    /* The volume of the intersection. */
+    double volume;
+    /* The volume is off by at most this. */
+    double volume_error;
+    /* The area of A's surface inside B. */
+    double area_a;
+    /* The area of B's surface inside A. */
+    double area_b;
+    /* The least and the largest coordinates of the intersection, in A's frame; NaN if it is empty. */
+    double bounds[2][3];
+    /* How thick A is where B passes through it; NaN if it does so nowhere. */
+    double pierced_a;
+    /* How thick B is where A passes through it. */
+    double pierced_b;
+} cbvh_intersection;
+
+/* Answers how much two meshes have in common. A mesh is pierced where the other one passes all the way through it: the other one goes
+ * in through one part of its surface and out through another one, and the thickness is the least distance between two such
+ * parts. It is not pierced where the other one only reaches into it, or takes a corner of it along. A common face of flush meshes
+ * encloses nothing. Each place counts as often as the surfaces wind around it: where parts of one mesh overlap, unite them
+ * before baking. Radii are left out. One core is used. It takes the time of cbvh_contacts, some 0.5 us for each of them, and
+ * some 0.1 us for each triangle in the box of the other mesh. CBVH_INVALID_ARGUMENT for a mesh that is not closed, and for a
+ * file that was baked without topology; CBVH_LIMIT if the budget of the querier does not suffice. */
+cbvh_status cbvh_intersections(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
+                               cbvh_intersection *answers);
+
+/* How two parts lie, and what they have in common. */
+typedef struct cbvh_measured_clash {
+    cbvh_clash clash;
+    /* For closed parts that overlap, are undecided, contain each other or are duplicated. NaN for all others. */
+    cbvh_intersection shared;
+} cbvh_measured_clash;
+
+/* Answers how two parts lie, as cbvh_clashes does, and what they have in common, as cbvh_intersections does. Parts that overlap
+ * are piercing or protruding. */
+cbvh_status cbvh_measured_clashes(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
+                                  const cbvh_clash_options *options, cbvh_measured_clash *answers);
 
 /* How two triangles of one mesh meet, by the corners that they have in common. */
 typedef int32_t cbvh_self_contact_kind;
@@ -1162,6 +1207,15 @@ typedef struct cbvh_scene_clash {
     cbvh_clash clash;
 } cbvh_scene_clash;
 
+/* A pair that clashes, how, and what both have in common. */
+typedef struct cbvh_scene_measured_clash {
+    cbvh_scene_pair pair;
+    /* As cbvh_measured_clashes answers, in A's frame. */
+    cbvh_clash clash;
+    /* The same, but with a box in the world, along its axes. */
+    cbvh_intersection shared;
+} cbvh_scene_measured_clash;
+
 /* Answers whether any pair touches. */
 cbvh_status cbvh_scene_collide(cbvh_scene scene, bool *answer);
 /* Answers whether any pair is at most `d` apart. */
@@ -1187,6 +1241,9 @@ cbvh_status cbvh_scene_contacts(cbvh_scene scene, cbvh_scene_contact *contacts, 
  * that are apart are left out. */
 cbvh_status cbvh_scene_clashes(cbvh_scene scene, const cbvh_clash_options *options, cbvh_scene_clash *clashes,
                                size_t capacity, size_t *count);
+/* Lists the same pairs, and measures what they have in common: see cbvh_measured_clashes. */
+cbvh_status cbvh_scene_measured_clashes(cbvh_scene scene, const cbvh_clash_options *options,
+                                        cbvh_scene_measured_clash *clashes, size_t capacity, size_t *count);
 
 /* Answers whether some instances can move freely at the same time along paths in the world, while the others stand
  * still. The answer is the earliest hit of all pairs with at least one moving instance. The present poses of moving

@@ -92,6 +92,8 @@ using Separation = cbvh_separation;
 using Penetration = cbvh_penetration;
 using SignedDistance = cbvh_signed_distance;
 using Clash = cbvh_clash;
+using Intersection = cbvh_intersection;
+using MeasuredClash = cbvh_measured_clash;
 using ClosestPoint = cbvh_closest_point;
 using RayHit = cbvh_ray_hit;
 using Segment = cbvh_segment;
@@ -938,6 +940,31 @@ public:
             return cbvh_clashes(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
         });
     }
+    /// The same, and what do they have in common?
+    MeasuredClash measured_clash(const Mesh &a, const Mesh &b, const Pose &pose, const ClashOptions &options = {}) {
+        const cbvh_clash_options raw_options = options.raw();
+        MeasuredClash answer{};
+        check(cbvh_measured_clashes(raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<MeasuredClash> measured_clash(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses,
+                                              const ClashOptions &options = {}) {
+        const cbvh_clash_options raw_options = options.raw();
+        return detail::answers<MeasuredClash>(poses.size(), [&](MeasuredClash *answers) {
+            return cbvh_measured_clashes(raw(), a.raw(), b.raw(), poses.data(), poses.size(), &raw_options, answers);
+        });
+    }
+    /// How much do they have in common: volume, box, and how thick they are where they pierce each other?
+    Intersection intersection(const Mesh &a, const Mesh &b, const Pose &pose) {
+        Intersection answer{};
+        check(cbvh_intersections(raw(), a.raw(), b.raw(), &pose, 1, &answer));
+        return answer;
+    }
+    std::vector<Intersection> intersection(const Mesh &a, const Mesh &b, const std::vector<Pose> &poses) {
+        return detail::answers<Intersection>(poses.size(), [&](Intersection *answers) {
+            return cbvh_intersections(raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
+        });
+    }
     /// Which triangles of a mesh meet where they should not?
     std::vector<SelfContact> self_contacts(const Mesh &mesh) {
         return detail::list<SelfContact>(room_, [&](SelfContact *contacts, std::size_t capacity, std::size_t *count) {
@@ -1330,6 +1357,14 @@ public:
         return detail::list<cbvh_scene_clash>(
             room_, [&](cbvh_scene_clash *found, std::size_t capacity, std::size_t *count) {
                 return cbvh_scene_clashes(raw(), &raw_options, found, capacity, count);
+            });
+    }
+    /// The same, with what they have in common.
+    std::vector<cbvh_scene_measured_clash> measured_clashes(const ClashOptions &options = {}) {
+        const cbvh_clash_options raw_options = options.raw();
+        return detail::list<cbvh_scene_measured_clash>(
+            room_, [&](cbvh_scene_measured_clash *found, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_measured_clashes(raw(), &raw_options, found, capacity, count);
             });
     }
 

@@ -8,9 +8,9 @@ use crate::pairs::{Least, Question};
 use crate::queriers;
 use crate::status::Failure;
 use crate::types::{
-    ClashChoices, ClashRow, MeshHandle, PatchChoices, PatchCounts, PatchRow, PenetrationChoices,
-    PenetrationRow, PointRow, PoseRows, QuerierHandle, RegionRow, SelfContactRow, SeparationRow,
-    SignedDistanceRow,
+    ClashChoices, ClashRow, IntersectionRow, MeasuredClashRow, MeshHandle, PatchChoices, PatchCounts,
+    PatchRow, PenetrationChoices, PenetrationRow, PointRow, PoseRows, QuerierHandle, RegionRow,
+    SelfContactRow, SeparationRow, SignedDistanceRow,
 };
 use bvh_query::{Pose, Querier, QueryError, Shape};
 
@@ -115,6 +115,41 @@ pub unsafe extern "C" fn cbvh_clashes(
         let options = input::options("options", options)?.read();
         question
             .each_on_one_core(answers, |querier, [a, b], (_, pose)| Ok(querier.clash(a, b, pose, &options)?))
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_measured_clashes(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    poses: *const PoseRows,
+    count: usize,
+    options: *const ClashChoices,
+    answers: *mut MeasuredClashRow,
+) -> i32 {
+    let question = Question { querier, a, b, poses, count };
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let options = input::options("options", options)?.read().magnitudes(true);
+        question
+            .each_on_one_core(answers, |querier, [a, b], (_, pose)| Ok(querier.clash(a, b, pose, &options)?))
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_intersections(
+    querier: QuerierHandle,
+    a: MeshHandle,
+    b: MeshHandle,
+    poses: *const PoseRows,
+    count: usize,
+    answers: *mut IntersectionRow,
+) -> i32 {
+    let question = Question { querier, a, b, poses, count };
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        question.each_on_one_core(answers, |querier, [a, b], (_, pose)| Ok(querier.intersection(a, b, pose)?))
     })
 }
 

@@ -6,10 +6,10 @@ use crate::input::Plain;
 use crate::status::Failure;
 use bvh_query::{
     Backend, Clash, ClashClass, ClashOptions, ClosestPoint, Contact, ContactRegion, Distance,
-    DistanceOptions, InstanceId, MotionAnswer, MotionOptions, Patch, PatchOptions, PatchPoint, Penetration,
-    PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash, SceneClosestPoint,
-    SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit, SceneSignedDistance, SelfContact,
-    SelfContactKind, Separation, Side, SignedDistance, SignedPointDistance,
+    DistanceOptions, InstanceId, Intersection, MotionAnswer, MotionOptions, Patch, PatchOptions, PatchPoint,
+    Penetration, PenetrationOptions, Pose, QueryStats, Ray, RayHit, RegionKind, Relation, SceneClash,
+    SceneClosestPoint, SceneContact, SceneDistance, SceneMotionAnswer, ScenePair, SceneRayHit,
+    SceneSignedDistance, SelfContact, SelfContactKind, Separation, Side, SignedDistance, SignedPointDistance,
 };
 use std::ffi::c_char;
 
@@ -119,6 +119,16 @@ structures! {
         is_spent: i32,
     }
     ClashRow { kind: i32, relation: i32, distance: f64, point: [f64; 3], depth: PenetrationRow }
+    IntersectionRow {
+        volume: f64,
+        volume_error: f64,
+        area_a: f64,
+        area_b: f64,
+        bounds: [[f64; 3]; 2],
+        pierced_a: f64,
+        pierced_b: f64,
+    }
+    MeasuredClashRow { clash: ClashRow, shared: IntersectionRow }
     RegionRow {
         contact: ContactRow,
         kind: i32,
@@ -188,6 +198,7 @@ structures! {
     SceneRelationRow { pair: PairRow, relation: i32, reserved: i32 }
     SceneContactRow { pair: PairRow, contact: ContactRow }
     SceneClashRow { pair: PairRow, clash: ClashRow }
+    SceneMeasuredClashRow { pair: PairRow, clash: ClashRow, shared: IntersectionRow }
     RobotCounts { joints: usize, links: usize, groups: usize, states: usize }
     LimitsRow { lower: f64, upper: f64 }
     JointValueRow { joint: usize, value: f64 }
@@ -220,6 +231,7 @@ numbers!(CLASH_APART = 0(ClashClass::Apart), CLASH_NEAR = 1(ClashClass::Near));
 numbers!(CLASH_TOUCHING = 2(ClashClass::Touching), CLASH_OVERLAPPING = 3(ClashClass::Overlapping));
 numbers!(CLASH_CONTAINED = 4(ClashClass::Contained), CLASH_DUPLICATED = 5(ClashClass::Duplicated));
 numbers!(CLASH_UNDECIDED = 6(ClashClass::Undecided), CLASH_INTERSECTING = 7(ClashClass::Intersecting));
+numbers!(CLASH_PIERCING = 8(ClashClass::Piercing), CLASH_PROTRUDING = 9(ClashClass::Protruding));
 numbers!(REGION_POINT = 0(RegionKind::Point), REGION_SEGMENT = 1(RegionKind::Segment));
 numbers!(REGION_POLYGON = 2(RegionKind::Polygon));
 numbers!(SELF_CROSSING = 0(SelfContactKind::Crossing), SELF_AT_CORNER = 1(SelfContactKind::AtCorner));
@@ -384,6 +396,11 @@ row!(of: ClosestPoint { distance, lower, upper, point, object, triangle }
 row!(of: RayHit { t, lower, upper, point, object, triangle }
     => HitRow { instance: Instance::NONE, found: 1, reserved: 0 });
 row!(of: Clash { distance, point, depth } => ClashRow { kind: of.class as i32, relation: of.relation as i32 });
+row!(of: Intersection { volume, volume_error, area_a, area_b } => IntersectionRow {
+    bounds: of.bounds.unwrap_or(Plain::NONE),
+    pierced_a: of.pierced_a.unwrap_or(Plain::NONE),
+    pierced_b: of.pierced_b.unwrap_or(Plain::NONE)
+});
 row!(of: ContactRegion { contact, count, normal_a, normal_b, error, overlap }
     => RegionRow { kind: of.kind as i32, points: of.all_points });
 row!(of: SelfContact { object_a, triangle_a, object_b, triangle_b } => SelfContactRow { kind: of.kind as i32 });
@@ -399,7 +416,20 @@ macro_rules! found {
     )* };
 }
 found!(SceneDistanceRow: Self::NONE, SceneSignedDistanceRow: Self::NONE, HitRow: Self::NONE, PenetrationRow: Self::NONE);
+found!(IntersectionRow: Self::NONE);
 found!(ClosestRow: Self { side: SIDE_NOT_ASKED, ..Self::NONE });
+
+impl From<Clash> for MeasuredClashRow {
+    fn from(of: Clash) -> Self {
+        Self { clash: of.into(), shared: of.magnitudes.into() }
+    }
+}
+
+impl From<SceneClash> for SceneMeasuredClashRow {
+    fn from(of: SceneClash) -> Self {
+        Self { pair: of.pair.into(), clash: of.clash.into(), shared: of.clash.magnitudes.into() }
+    }
+}
 
 impl From<SignedPointDistance> for ClosestRow {
     fn from(of: SignedPointDistance) -> Self {

@@ -169,6 +169,87 @@ static void clashes(void) {
     OK(cbvh_mesh_free(open));
 }
 
+/* A cube whose sides were scaled. */
+static cbvh_mesh block(double x, double y, double z) {
+    double vertices[24];
+    for (size_t k = 0; k < 24; k++) {
+        vertices[k] = CUBE_VERTICES[k] * (k % 3 == 0 ? x : k % 3 == 1 ? y : z);
+    }
+    cbvh_mesh made;
+    OK(cbvh_bake(vertices, 8, CUBE_FACES, 12, NULL, &made));
+    return made;
+}
+
+/* What blocks have in common. */
+static void intersections(void) {
+    const cbvh_mesh one = cube(1), other = block(1.5, 0.75, 0.5), plate = block(4, 3, 0.25), rod = block(0.5, 0.5, 2);
+    enum { COUNT = 17 };
+    cbvh_pose poses[COUNT];
+    cbvh_intersection answers[COUNT], alone;
+    cbvh_measured_clash clashes[COUNT];
+    for (int k = 0; k < COUNT; k++) {
+        poses[k] = shift(k / 8.0 - 1, 0.5, 0.375);
+    }
+    OK(cbvh_intersections(querier, one, other, poses, COUNT, answers));
+    OK(cbvh_measured_clashes(querier, one, other, poses, COUNT, NULL, clashes));
+    for (int k = 0; k < COUNT; k++) {
+        const double x = k / 8.0 - 1, lo = fmax(-0.5, x - 0.75), hi = fmin(0.5, x + 0.75), side = fmax(hi - lo, 0);
+        const cbvh_intersection *found = &answers[k];
+        /* 0.375 of the second block's side along each of the other axes. */
+        CHECK(fabs(found->volume - side * 0.375 * 0.375) <= found->volume_error && found->volume_error < 1e-12);
+        CHECK(fabs(found->area_a + found->area_b - 2 * (0.75 * side + 0.375 * 0.375)) < 1e-14);
+        CHECK(found->bounds[0][0] == lo && found->bounds[1][0] == hi && found->bounds[0][1] == 0.125 &&
+              found->bounds[1][1] == 0.5 && found->bounds[0][2] == 0.125 && found->bounds[1][2] == 0.5);
+        CHECK(isnan(found->pierced_a) && isnan(found->pierced_b));
+        OK(cbvh_intersections(querier, one, other, &poses[k], 1, &alone));
+        CHECK(memcmp(&alone, found, sizeof alone) == 0);
+        CHECK(clashes[k].clash.kind == CBVH_CLASH_PROTRUDING && memcmp(&clashes[k].shared, found, sizeof alone) == 0);
+    }
+    /* Flush and distant blocks have nothing in common. */
+    poses[0] = shift(1.25, 0.125, 0);
+    poses[1] = shift(3, 0, 0);
+    OK(cbvh_intersections(querier, one, other, poses, 2, answers));
+    OK(cbvh_measured_clashes(querier, one, other, poses, 2, NULL, clashes));
+    for (int k = 0; k < 2; k++) {
+        CHECK(answers[k].volume == 0 && isnan(clashes[k].shared.volume));
+    }
+    CHECK(isnan(answers[1].bounds[0][0]) && isnan(answers[1].bounds[1][2]));
+    CHECK(clashes[0].clash.kind == CBVH_CLASH_TOUCHING && clashes[1].clash.kind == CBVH_CLASH_APART);
+    /* A rod passes through a plate, and sticks in it. */
+    poses[0] = shift(1, 0.5, 0.25);
+    poses[1] = shift(1, 0.5, 1.0625);
+    cbvh_clash plain;
+    OK(cbvh_measured_clashes(querier, plate, rod, poses, 2, NULL, clashes));
+    CHECK(clashes[0].clash.kind == CBVH_CLASH_PIERCING && clashes[0].shared.pierced_a == 0.25);
+    CHECK(clashes[1].clash.kind == CBVH_CLASH_PROTRUDING && isnan(clashes[1].shared.pierced_a));
+    CHECK(fabs(clashes[0].shared.volume - 0.0625) < 1e-14 && fabs(clashes[1].shared.volume - 0.015625) < 1e-14);
+    CHECK(isnan(clashes[0].shared.pierced_b) && isnan(clashes[1].shared.pierced_b));
+    OK(cbvh_clashes(querier, plate, rod, poses, 1, NULL, &plain));
+    CHECK(plain.kind == CBVH_CLASH_OVERLAPPING && plain.depth.lower == clashes[0].clash.depth.lower);
+    const cbvh_pose back = shift(-1, -0.5, -0.25);
+    OK(cbvh_intersections(querier, rod, plate, &back, 1, answers));
+    CHECK(isnan(answers[0].pierced_a) && answers[0].pierced_b == 0.25);
+    /* In a scene, boxes are in the world. */
+    cbvh_scene scene;
+    cbvh_scene_measured_clash found[1];
+    cbvh_instance first, second;
+    size_t count;
+    OK(cbvh_scene_new(0, &scene));
+    poses[0] = shift(10, 0, 0);
+    poses[1] = shift(11, 0.5, 0.25);
+    OK(cbvh_scene_add(scene, plate, &poses[0], "plate", &first));
+    OK(cbvh_scene_add(scene, rod, &poses[1], "rod", &second));
+    OK(cbvh_scene_measured_clashes(scene, NULL, found, 1, &count));
+    CHECK(count == 1 && found[0].pair.a.id == first.id && found[0].clash.kind == CBVH_CLASH_PIERCING);
+    CHECK(found[0].shared.pierced_a == 0.25 && found[0].shared.bounds[0][0] == 10.75 && found[0].shared.bounds[1][0] == 11.25);
+    FAILS(cbvh_scene_measured_clashes(scene, NULL, found, 0, &count), CBVH_BUFFER_TOO_SMALL, "clashes: ");
+    OK(cbvh_scene_free(scene));
+    OK(cbvh_mesh_free(one));
+    OK(cbvh_mesh_free(other));
+    OK(cbvh_mesh_free(plate));
+    OK(cbvh_mesh_free(rod));
+}
+
 /* Where and how deep cubes overlap. */
 static void overlaps(void) {
     const cbvh_mesh one = cube(1), quarter = cube(0.25), pair = two_cubes();
@@ -1505,6 +1586,7 @@ int main(int count, char **arguments) {
         signed_distances_of_scenes(choices & 1, choices >> 1);
     }
     clashes();
+    intersections();
     self_contacts();
     open_edges();
     borrowed();

@@ -141,6 +141,8 @@ static void *ask(void *parallel) {
     cbvh_penetration depth;
     cbvh_signed_distance number;
     cbvh_clash clash;
+    cbvh_measured_clash measured;
+    cbvh_intersection shared;
     size_t count;
     OK(cbvh_separations(querier, mesh, mesh, &near, x_axis, 1, &way));
     OK(cbvh_penetrations(querier, mesh, mesh, &near, 1, NULL, &depth));
@@ -149,6 +151,8 @@ static void *ask(void *parallel) {
     OK(cbvh_signed_distances(querier, mesh, pair, &near, 1, NULL, &number));
     OK(cbvh_signed_distances(querier, mesh, other, &near, 1, NULL, &number));
     OK(cbvh_clashes(querier, mesh, mesh, &near, 1, NULL, &clash));
+    OK(cbvh_measured_clashes(querier, mesh, pair, &near, 1, NULL, &measured));
+    OK(cbvh_intersections(querier, mesh, pair, &near, 1, &shared));
     (void)cbvh_patches(querier, mesh, other, &near, 1, NULL, NULL, NULL, 0, &count, NULL, 0, NULL);
     (void)cbvh_self_contacts(querier, other, NULL, 0, &count);
     cbvh_mesh cylinder, solid, padded;

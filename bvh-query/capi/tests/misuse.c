@@ -416,6 +416,8 @@ static void overlaps(void) {
     cbvh_penetration depths[2];
     cbvh_signed_distance numbers[2];
     cbvh_clash clashes[2];
+    cbvh_measured_clash measured[2];
+    cbvh_intersection shared[2];
     cbvh_contact_region regions[1];
     cbvh_patch patches[1];
     cbvh_self_contact contacts[1];
@@ -494,6 +496,16 @@ static void overlaps(void) {
     OK(cbvh_signed_distances(querier, mesh, mesh, poses, 1, &all, &numbers[0]));
     OK(cbvh_signed_distances(querier, mesh, mesh, poses, 1, NULL, &numbers[1]));
     CHECK(memcmp(&numbers[0], &numbers[1], sizeof *numbers) == 0);
+    FAILS(cbvh_intersections(querier, mesh, no_mesh, poses, 2, shared), CBVH_INVALID_HANDLE, "b: ");
+    FAILS(cbvh_intersections(querier, mesh, mesh, NULL, 2, shared), CBVH_INVALID_ARGUMENT,
+          "poses: expected a pointer, found NULL");
+    FAILS(cbvh_intersections(querier, mesh, mesh, poses, 2, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
+    FAILS(cbvh_measured_clashes(querier, no_mesh, mesh, poses, 2, NULL, measured), CBVH_INVALID_HANDLE, "a: ");
+    FAILS(cbvh_measured_clashes(querier, mesh, mesh, poses, 2, &smaller, measured), CBVH_INVALID_ARGUMENT,
+          "options.size: ");
+    FAILS(cbvh_measured_clashes(querier, mesh, mesh, poses, 2, NULL, NULL), CBVH_INVALID_ARGUMENT,
+          "answers: expected a pointer, found NULL");
     /* One triangle has no inside, and nobody knows of a mesh that was baked without topology. */
     cbvh_mesh open, unknown;
     const cbvh_bake_options bare = {.size = sizeof bare, .no_topology = 1};
@@ -508,6 +520,11 @@ static void overlaps(void) {
           "does not say which objects are closed");
     FAILS(cbvh_signed_distances(querier, unknown, mesh, poses, 2, NULL, numbers), CBVH_INVALID_ARGUMENT,
           "does not say which objects are closed");
+    FAILS(cbvh_intersections(querier, open, mesh, poses, 2, shared), CBVH_INVALID_ARGUMENT, "closed objects");
+    FAILS(cbvh_intersections(querier, mesh, unknown, poses, 2, shared), CBVH_INVALID_ARGUMENT,
+          "does not say which objects are closed");
+    OK(cbvh_measured_clashes(querier, mesh, open, poses, 2, NULL, measured));
+    CHECK(measured[0].clash.kind == CBVH_CLASH_INTERSECTING && isnan(measured[0].shared.volume));
     OK(cbvh_mesh_free(open));
     OK(cbvh_mesh_free(unknown));
     FAILS(cbvh_contact_regions(querier, mesh, mesh, poses, 2, NULL, NULL, 1, &count), CBVH_INVALID_ARGUMENT,
@@ -545,6 +562,8 @@ static void overlaps(void) {
     OK(cbvh_separations(querier, mesh, mesh, NULL, NULL, 0, NULL));
     OK(cbvh_penetrations(querier, mesh, mesh, NULL, 0, NULL, NULL));
     OK(cbvh_signed_distances(querier, mesh, mesh, NULL, 0, NULL, NULL));
+    OK(cbvh_intersections(querier, mesh, mesh, NULL, 0, NULL));
+    OK(cbvh_measured_clashes(querier, mesh, mesh, NULL, 0, NULL, NULL));
     OK(cbvh_patches(querier, mesh, mesh, NULL, 0, NULL, NULL, NULL, 0, &count, NULL, 0, &region_count));
     CHECK(count == 0 && region_count == 0);
     /* A budget that ends all of them. */
@@ -553,6 +572,8 @@ static void overlaps(void) {
     FAILS(cbvh_signed_distances(querier, mesh, mesh, poses, 1, NULL, numbers), CBVH_LIMIT, "budget");
     FAILS(cbvh_separations(querier, mesh, mesh, poses, directions, 1, ways), CBVH_LIMIT, "budget");
     FAILS(cbvh_clashes(querier, mesh, mesh, poses, 1, NULL, clashes), CBVH_LIMIT, "budget");
+    FAILS(cbvh_intersections(querier, mesh, mesh, poses, 1, shared), CBVH_LIMIT, "budget");
+    FAILS(cbvh_measured_clashes(querier, mesh, mesh, poses, 1, NULL, measured), CBVH_LIMIT, "budget");
     FAILS(cbvh_self_contacts(querier, mesh, contacts, 1, &count), CBVH_LIMIT, "budget");
     OK(cbvh_querier_set_budget(querier, UINT64_MAX));
 }

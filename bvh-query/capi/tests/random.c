@@ -261,15 +261,17 @@ int main(int argument_count, char **arguments) {
         case 78: status = cbvh_scene_parent(s, i, out); break;
         case 79: status = cbvh_scene_set_mesh(s, i, a); break;
         case 80: status = cbvh_separations(q, a, b, in, more, n, out); break;
-        case 81: status = cbvh_penetrations(q, a, b, in, n, options, out); break;
+        case 81: status = below(2) ? cbvh_penetrations(q, a, b, in, n, options, out) : cbvh_intersections(q, a, b, in, n, out); break;
         case 82: status = cbvh_contact_regions(q, a, b, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
         case 83: status = below(2) ? cbvh_patches(q, a, b, in, n, options, NULL, out, capacity, &count, NULL, 0,
                                                   below(2) ? NULL : counts)
                                    : cbvh_contact_points(q, a, b, in, n, options, below(2) ? NULL : counts, out, capacity,
                                                          &count, NULL, 0, NULL); break;
         case 84: status = cbvh_self_contacts(q, a, out, capacity, &count); break;
-        case 85: status = cbvh_clashes(q, a, b, in, n, options, out); break;
-        case 86: status = cbvh_scene_clashes(s, options, out, capacity, &count); break;
+        case 85: status = (below(2) ? cbvh_clashes(q, a, b, in, n, options, out)
+            : cbvh_measured_clashes(q, a, b, in, n, options, out)); break;
+        case 86: status = (below(2) ? cbvh_scene_clashes(s, options, out, capacity, &count)
+            : cbvh_scene_measured_clashes(s, options, out, capacity, &count)); break;
         case 87: status = cbvh_robot_from_urdf(below(4) ? urdf : name, any_robot_options(), (cbvh_robot *)&made); break;
         case 88: status = cbvh_robot_clone(o, (cbvh_robot *)&made); break;
         case 89: status = cbvh_robot_set_parallel(o, any_flag()); break;

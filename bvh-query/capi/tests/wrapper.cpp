@@ -1,6 +1,7 @@
 // The C++ header: handles that are freed once, copies, moves, exceptions, matrices of other libraries, and answers.
 #include <cbvh.hpp>
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -199,6 +200,13 @@ void overlaps() {
     CHECK(clash[0].kind == CBVH_CLASH_OVERLAPPING && clash[1].kind == CBVH_CLASH_NEAR && clash[1].distance == 2);
     CHECK(querier.clash(one, one, corner).depth.lower > 0.2 && querier.clash(one, one, away).kind == CBVH_CLASH_APART);
     FAILS(querier.clash(one, one, corner, {-1}), CBVH_INVALID_ARGUMENT, "clearance: ");
+    const auto shared = querier.intersection(one, one, corner);
+    CHECK(shared.volume > 0 && shared.bounds[1][0] == 0.5 && querier.intersection(one, one, poses)[1].volume == 0);
+    const auto measured = querier.measured_clash(one, one, poses, near);
+    CHECK(measured[0].clash.kind == CBVH_CLASH_PROTRUDING && measured[0].shared.volume == shared.volume);
+    CHECK(measured[1].clash.kind == CBVH_CLASH_NEAR && std::isnan(measured[1].shared.volume));
+    CHECK(querier.measured_clash(one, one, corner).shared.volume == shared.volume);
+    FAILS(querier.measured_clash(one, one, corner, {-1}), CBVH_INVALID_ARGUMENT, "clearance: ");
     cbvh::Scene scene;
     scene.add(one, {});
     scene.add(one, corner);
@@ -209,6 +217,8 @@ void overlaps() {
     const auto clashes = scene.clashes(near);
     CHECK(clashes.size() == 1 && clashes[0].clash.kind == CBVH_CLASH_OVERLAPPING && scene.clashes().size() == 1);
     FAILS(scene.clashes({0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
+    CHECK(scene.measured_clashes().size() == 1 && scene.measured_clashes(near)[0].shared.volume == shared.volume);
+    FAILS(scene.measured_clashes({0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
     const auto regions = querier.contact_regions(one, one, corner);
     CHECK(regions.size() == querier.contacts(one, one, corner).size() && regions[0].count > 0);
     const auto lists = querier.contact_regions(one, one, poses);

@@ -8,7 +8,8 @@ use crate::paths::AskedPath;
 use crate::status::Failure;
 use crate::types::{
     ClashChoices, Instance, MotionChoices, MotionRow, PairRow, PathHandle, PenetrationChoices, SceneClashRow,
-    SceneContactRow, SceneDistanceRow, SceneHandle, SceneRelationRow, SceneSignedDistanceRow,
+    SceneContactRow, SceneDistanceRow, SceneHandle, SceneMeasuredClashRow, SceneRelationRow,
+    SceneSignedDistanceRow,
 };
 use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 
@@ -25,6 +26,8 @@ about! {
     list cbvh_scene_contacts() -> contacts: SceneContactRow = scene.contacts()?;
     list cbvh_scene_clashes(options: *const ClashChoices,) -> clashes: SceneClashRow =
         scene.clashes(&input::options("options", options)?.read())?;
+    list cbvh_scene_measured_clashes(options: *const ClashChoices,) -> clashes: SceneMeasuredClashRow =
+        scene.clashes(&input::options("options", options)?.read().magnitudes(true))?;
 }
 
 /// Refuses an instance that is named twice: only one of its ways would be looked at.
