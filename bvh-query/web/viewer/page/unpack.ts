@@ -1,4 +1,4 @@
-/** Unpacks parts of this page: base64 of gzip, in elements that run no code. */
+/** Unpacks parts of this page: gzip in base 85, in elements that run no code. */
 
 /** The function that unpacked this code. */
 declare global {
