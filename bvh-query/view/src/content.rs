@@ -92,6 +92,14 @@ pub(crate) struct Found {
     pub(crate) point: [f64; 3],
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) translation: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) volume: Option<f64>,
+    #[serde(skip_serializing_if = "is_neither")]
+    pub(crate) pierced: [Option<f64>; 2],
+}
+
+fn is_neither(pierced: &[Option<f64>; 2]) -> bool {
+    *pierced == [None; 2]
 }
 
 /// Returns the rows of the 3 by 4 matrix of a pose.

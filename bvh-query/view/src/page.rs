@@ -79,6 +79,10 @@ pub struct PlacedClash {
     pub point: [f64; 3],
     /// What moves the second instance out of the first one.
     pub translation: Option<[f64; 3]>,
+    /// The volume that both have in common, if that was measured.
+    pub volume: Option<f64>,
+    /// How thick each of both is where the other one passes through it, if that was measured and it does.
+    pub pierced: [Option<f64>; 2],
 }
 
 impl Page {
@@ -180,13 +184,15 @@ impl Page {
     ) -> Result<Self, PageError> {
         let (files, instances) = instances(placed)?;
         let found = clashes.iter().map(|clash| {
-            let PlacedClash { pair: [a, b], class, depth, distance, point, translation } = *clash;
+            let PlacedClash { pair: [a, b], class, depth, distance, point, translation, volume, pierced } =
+                *clash;
             instance(instances.len(), a)?;
             instance(instances.len(), b)?;
             let [lower, upper] = depth.map_or([None; 2], |depth| depth.map(Some));
-            let lengths = [lower, upper, distance].into_iter().flatten();
+            let [pierced_a, pierced_b] = pierced;
+            let lengths = [lower, upper, distance, volume, pierced_a, pierced_b].into_iter().flatten();
             lengths.chain(point).chain(translation.into_iter().flatten()).try_for_each(finite)?;
-            Ok(Found { a, b, class, lower, upper, distance, point, translation })
+            Ok(Found { a, b, class, lower, upper, distance, point, translation, volume, pierced })
         });
         let clashes = found.collect::<Result<_, PageError>>()?;
         Ok(Self { files, parts: Vec::new(), show: Show::Clash { instances, clashes } })

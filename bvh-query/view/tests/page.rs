@@ -274,6 +274,8 @@ fn clashes_have_what_is_known() {
         distance: None,
         point: [1.0, 2.0, 3.0],
         translation: Some([0.0, 0.75, 0.0]),
+        volume: None,
+        pierced: [None; 2],
     };
     let near = PlacedClash {
         pair: [1, 2],
@@ -283,13 +285,25 @@ fn clashes_have_what_is_known() {
         translation: None,
         ..deep
     };
-    let (content, _) = unpacked(&Page::clashes(instances(), &[deep, near]).unwrap());
+    let measured = PlacedClash {
+        class: ClashClass::Piercing,
+        volume: Some(2.5),
+        pierced: [None, Some(0.375)],
+        depth: None,
+        translation: None,
+        ..deep
+    };
+    let protruding = PlacedClash { class: ClashClass::Protruding, pierced: [None; 2], ..measured };
+    let all = [deep, near, measured, protruding];
+    let (content, _) = unpacked(&Page::clashes(instances(), &all).unwrap());
     assert_eq!(
         content["show"]["clashes"],
         json!([
             { "a": 0, "b": 1, "class": "overlapping", "lower": 0.5, "upper": 0.75, "point": [1.0, 2.0, 3.0],
               "translation": [0.0, 0.75, 0.0] },
             { "a": 1, "b": 2, "class": "near", "distance": 0.125, "point": [1.0, 2.0, 3.0] },
+            { "a": 0, "b": 1, "class": "piercing", "point": [1.0, 2.0, 3.0], "volume": 2.5, "pierced": [null, 0.375] },
+            { "a": 0, "b": 1, "class": "protruding", "point": [1.0, 2.0, 3.0], "volume": 2.5 },
         ])
     );
     let refused = |clash| Page::clashes(instances(), &[clash]).unwrap_err();
@@ -297,7 +311,13 @@ fn clashes_have_what_is_known() {
         refused(PlacedClash { pair: [0, 3], ..deep }),
         PageError::Instance { count: 3, found: 3 }
     ));
-    assert!(matches!(refused(PlacedClash { point: [f64::NAN; 3], ..deep }), PageError::Number { .. }));
+    for wrong in [
+        PlacedClash { point: [f64::NAN; 3], ..deep },
+        PlacedClash { volume: Some(f64::INFINITY), ..deep },
+        PlacedClash { pierced: [Some(f64::NAN), None], ..deep },
+    ] {
+        assert!(matches!(refused(wrong), PageError::Number { .. }));
+    }
 }
 
 #[test]

@@ -33,5 +33,7 @@ fn clash(of: &Found<'_>) -> PlacedClash {
         distance: of.distance,
         point: of.point,
         translation: of.translation,
+        volume: of.shared.map(|shared| shared.volume),
+        pierced: of.shared.map_or([None; 2], |shared| [shared.pierced_a, shared.pierced_b]),
     }
 }

@@ -270,6 +270,35 @@ fn clashes_are_about_parts_that_share_files() {
             assert_eq!(shown[field], told[field], "{field}");
         }
     }
+    // What both have in common is in the page if it was measured: a rod passes through a cube.
+    let cube = cube();
+    let rod = cube.lines().map(|line| match line.strip_prefix("v ") {
+        Some(corner) => {
+            let corner: Vec<f64> = corner.split(' ').map(|x| x.parse().unwrap()).collect();
+            format!("v {} {} {}\n", corner[0] / 4.0 + 0.25, corner[1] / 4.0 + 0.25, corner[2] * 4.0 - 1.5)
+        }
+        None => format!("{line}\n"),
+    });
+    folder.write("rod.obj", rod.collect::<String>());
+    folder.write(
+        "manifest.jsonl",
+        "{\"file\": \"cube.cbvh\", \"name\": \"first\"}\n{\"file\": \"rod.obj\", \"name\": \"rod\"}\n\
+        {\"file\": \"cube.cbvh\", \"name\": \"copy\"}\n",
+    );
+    let found =
+        folder.cbvh("clash --manifest manifest.jsonl --magnitudes --view page.html --json").done().json();
+    let (content, _) = page(&folder);
+    let (shown, told) = (&content["show"]["clashes"], &found["clashes"]);
+    for (shown, told) in shown.as_array().unwrap().iter().zip(told.as_array().unwrap()) {
+        assert!(
+            told["volume"].as_f64().unwrap() > 0.0 && shown["volume"] == told["volume"],
+            "{shown} {told}"
+        );
+        let pierced = if told["class"] == "piercing" { &told["pierced"] } else { &Value::Null };
+        assert_eq!(&shown["pierced"], pierced);
+    }
+    let classes: Vec<&Value> = told.as_array().unwrap().iter().map(|clash| &clash["class"]).collect();
+    assert_eq!(classes, ["piercing", "duplicated"]);
     folder.cbvh("clash --manifest manifest.jsonl --max-page 1MiB").failed(1, &["--max-page requires --view"]);
     folder.cbvh("clash --manifest manifest.jsonl --view -").failed(1, &["--view: expected a file, found -"]);
     // An input is no output, whether the command line, the manifest or a folder names it.

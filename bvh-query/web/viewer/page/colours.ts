@@ -13,6 +13,8 @@ export interface Palette {
     hit: number;
     near: number;
     depth: number;
+    /** What two meshes have in common. */
+    shared: number;
     normal: number;
     select: number;
     box: number;
@@ -29,6 +31,7 @@ const LIGHT: Palette = {
     hit: 0xdc2f4b,
     near: 0x0b8f62,
     depth: 0x7a35d6,
+    shared: 0x00a3ad,
     normal: 0x0369c4,
     select: 0x111827,
     box: 0x2f5fb3,
@@ -45,6 +48,7 @@ const DARK: Palette = {
     hit: 0xff4d67,
     near: 0x3ddc97,
     depth: 0xb889ff,
+    shared: 0x3fe0e8,
     normal: 0x62b6ff,
     select: 0xffffff,
     box: 0x8fb7ff,

@@ -28,6 +28,9 @@ export interface ContentClash {
     distance?: number;
     point?: number[];
     translation?: number[];
+    /** What both have in common, and how thick A and B are where they are pierced, if that was measured. */
+    volume?: number;
+    pierced?: [number | null, number | null];
 }
 
 export type Show =

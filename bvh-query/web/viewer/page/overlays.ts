@@ -195,6 +195,27 @@ export class Overlay {
         this.#add(mesh);
     }
 
+    /** Draws a translucent solid over everything: three places of points for each triangle. */
+    solid(points: ArrayLike<number>, triangles: number[], colour: number): void {
+        if (triangles.length === 0) {
+            return;
+        }
+        const geometry = new BufferGeometry();
+        geometry.setAttribute("position", new BufferAttribute(this.#flat(points), 3));
+        geometry.setIndex(triangles);
+        const material = new MeshBasicMaterial({
+            color: colour,
+            side: DoubleSide,
+            transparent: true,
+            opacity: 0.45,
+            depthTest: false,
+        });
+        const solid = new Mesh(geometry, material);
+        solid.name = "solid";
+        solid.frustumCulled = false;
+        this.#add(solid);
+    }
+
     label(text: string, at: ArrayLike<number>, kind: string): void {
         this.#labels.push(this.stage.label(text, this.stage.toStage(at), kind));
     }

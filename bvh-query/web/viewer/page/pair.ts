@@ -8,6 +8,7 @@ import { messageOf } from "./errors.js";
 import { Overlay } from "./overlays.js";
 import { part } from "./panel.js";
 import { axisAngle, fromAxisAngle, identity, numbersOf, type Pose, placedAt, position, words } from "./pose.js";
+import { sharedFacts, trianglesOf } from "./shared.js";
 import type { View } from "./view.js";
 
 /** By the number of the relation. Of a mesh that is not closed nobody knows what is inside, but surfaces are apart or not. */
@@ -236,6 +237,10 @@ export class Pair {
         const { near } = this;
         const { depth } = deep;
         this.#deepOverlay.clear();
+        if (deep.shared !== undefined) {
+            const { surface } = deep.shared;
+            this.#deepOverlay.solid(surface.points, trianglesOf(surface), palette.shared);
+        }
         this.#deepOverlay.segments(deep.curves, palette.hit, 2.5, { faint: 0.55 });
         const size = this.view.size;
         for (let k = 0; k < Math.min(deep.centres.length, 3 * MAX_ARROWS); k += 3) {
@@ -262,6 +267,9 @@ export class Pair {
                 fact("depth", h("span", {}, "from ", exact(depth.lower), " to ", exact(depth.upper))),
                 fact("moves B out", pointOf(depth.translation)),
             );
+        }
+        if (deep.shared !== undefined) {
+            rows.push(...sharedFacts(deep.shared.measures));
         }
         rows.push(fact("answered in", milliseconds(deep.took)));
         const out =
@@ -390,5 +398,5 @@ const firstOf = (points: Float64Array, other: Float64Array): Float64Array =>
     points.length >= 3 ? points.slice(0, 3) : other;
 
 /** Whether nothing touches, and nothing is known to be inside. */
-const isApart = ({ distance, relation = UNDEFINED }: NearAnswer): boolean =>
+export const isApart = ({ distance, relation = UNDEFINED }: NearAnswer): boolean =>
     distance.distance > 0 && (relation === APART || relation === UNDEFINED);

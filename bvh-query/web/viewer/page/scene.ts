@@ -1,5 +1,6 @@
 /** Scenes: frames of moving instances with a slider, the pairs that touch, and the nearest pair. Clash reports: a list. */
 
+import type { Intersection } from "../../ts/answers.js";
 import type { FrameAnswer } from "../worker/scenes.js";
 import { Latest } from "./asker.js";
 import type { Body } from "./bodies.js";
@@ -8,9 +9,11 @@ import { countOf, exact, fact, fill, h, milliseconds, pointOf, short } from "./d
 import { messageOf } from "./errors.js";
 import type { Look, Tint } from "./look.js";
 import { Overlay } from "./overlays.js";
+import { isApart } from "./pair.js";
 import { part } from "./panel.js";
 import { Player } from "./player.js";
 import { move, type Pose } from "./pose.js";
+import { piercedFacts, sharedFacts, trianglesOf } from "./shared.js";
 import type { View } from "./view.js";
 
 type SceneShow = Extract<Content["show"], { kind: "scene" | "clash" }>;
@@ -266,7 +269,8 @@ export class SceneView implements Tint {
 
     /** Frames a pair, and asks where it touches. */
     async #showPair(a: number, b: number, clash?: ContentClash): Promise<void> {
-        this.#chosen = [a, b];
+        const chosen: [number, number] = [a, b];
+        this.#chosen = chosen;
         const { view } = this;
         const [first, second] = [view.bodies[a], view.bodies[b]];
         if (first === undefined || second === undefined) {
@@ -283,6 +287,10 @@ export class SceneView implements Tint {
         view.stage.fit(box, true);
         const pose = await view.asker.ask("between", first.pose, second.pose);
         const near = await view.asker.ask("near", first.side, second.side, pose);
+        // Meanwhile another pair may have been chosen.
+        if (this.#chosen !== chosen) {
+            return;
+        }
         view.setAnswer({ distance: near.distance.distance, pair: [a, b], contacts: near.contacts });
         const toWorld = (points: ArrayLike<number>) => {
             const moved: number[] = [];
@@ -294,8 +302,6 @@ export class SceneView implements Tint {
         if (near.contacts > 0) {
             this.#pairOverlay.triangles(first, near.touchingA, palette.hit);
             this.#pairOverlay.triangles(second, near.touchingB, palette.hit);
-            const deep = await view.asker.ask("deep", first.side, second.side, pose);
-            this.#pairOverlay.segments(toWorld(deep.curves), palette.hit, 2.5, { faint: 0.55 });
         } else {
             const ends = toWorld([...near.distance.pointA, ...near.distance.pointB]);
             this.#pairOverlay.segments(ends, palette.near, 3);
@@ -305,6 +311,21 @@ export class SceneView implements Tint {
             this.#pairOverlay.dots(clash.point, palette.depth, 14);
             if (clash.translation !== undefined) {
                 this.#pairOverlay.arrow(clash.point, clash.translation, palette.depth, 0.01);
+            }
+        }
+        if (isApart(near)) {
+            return;
+        }
+        const { curves, shared } = await view.asker.ask("deep", first.side, second.side, pose);
+        if (this.#chosen !== chosen) {
+            return;
+        }
+        this.#pairOverlay.segments(toWorld(curves), palette.hit, 2.5, { faint: 0.55 });
+        if (shared !== undefined) {
+            const { measures, surface } = shared;
+            this.#pairOverlay.solid(toWorld(surface.points), trianglesOf(surface), palette.shared);
+            if (clash !== undefined) {
+                this.#showClash(clash, measures);
             }
         }
     }
@@ -322,17 +343,24 @@ export class SceneView implements Tint {
     #listClashes(): void {
         const shown = this.#clashes.filter((clash) => this.#filter.value === "" || clash.class === this.#filter.value);
         const rows = shown.slice(0, MAX_LISTED_CLASHES).map((clash) => {
+            const { volume, pierced = [] } = clash;
+            const thickest = Math.max(...pierced.map((thickness) => thickness ?? 0));
             const depth =
                 clash.distance !== undefined && clash.distance > 0
                     ? `${short(clash.distance)} apart`
                     : clash.upper !== undefined
                       ? `depth ${short(clash.lower ?? 0)} to ${short(clash.upper)}`
                       : "";
+            const words = [
+                depth,
+                volume === undefined ? "" : `volume ${short(volume)}`,
+                thickest > 0 ? `${short(thickest)} pierced` : "",
+            ];
             const detail = h(
                 "span",
                 { class: "list-detail" },
                 h("span", { class: `badge ${clash.class}` }, clash.class),
-                h("span", { class: "muted" }, depth),
+                h("span", { class: "muted" }, words.filter((word) => word !== "").join(", ")),
             );
             return this.#row(clash.a, clash.b, detail, () => {
                 void this.choose(clash.a, clash.b, clash);
@@ -349,7 +377,8 @@ export class SceneView implements Tint {
         );
     }
 
-    #showClash(clash: ContentClash): void {
+    /** Shows the facts of a clash: those of the command and, once it is measured, what both parts have in common. */
+    #showClash(clash: ContentClash, measures?: Intersection): void {
         const box = this.#clashBox.querySelector<HTMLElement>(".clash-facts");
         if (box !== null) {
             fill(
@@ -361,6 +390,12 @@ export class SceneView implements Tint {
                     fact("B", this.#name(clash.b)),
                     clash.upper !== undefined && fact("depth", exact(clash.lower ?? 0), " to ", exact(clash.upper)),
                     clash.distance !== undefined && clash.distance > 0 && fact("distance", exact(clash.distance)),
+                    ...(measures !== undefined
+                        ? sharedFacts(measures)
+                        : [
+                              clash.volume !== undefined && fact("volume in both", exact(clash.volume)),
+                              ...piercedFacts(clash.pierced ?? []),
+                          ]),
                     clash.point !== undefined && fact("point", pointOf(clash.point)),
                     clash.translation !== undefined && fact("moves B out", pointOf(clash.translation)),
                 ),

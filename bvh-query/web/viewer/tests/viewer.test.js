@@ -316,6 +316,76 @@ test("contact shows its depth, and moves B out", { skip: WITHOUT }, async () => 
     await close();
 });
 
+/** Shows facts of the page: names and what is beside them, with all digits where the page shortens. */
+const factsIn = (page, box) =>
+    page.evaluate((box) => {
+        const rows = document.querySelectorAll(`${box} .fact`);
+        const value = (row) =>
+            row.querySelector("dd [title]")?.getAttribute("title") ?? row.querySelector("dd").textContent;
+        return Object.fromEntries([...rows].map((row) => [row.querySelector("dt").textContent, value(row)]));
+    }, box);
+
+/** The triangles of each solid on the stage, and the volume that they enclose in mesh units. */
+const solids = (page) =>
+    page.evaluate(() => {
+        const { stage } = window.cbvhView.view;
+        const found = [];
+        stage.scene.traverse((part) => {
+            if (part.name === "solid") {
+                const [places, points] = [part.geometry.index.array, part.geometry.attributes.position.array];
+                const corner = (place) => points.subarray(3 * place, 3 * place + 3);
+                let volume = 0;
+                for (let k = 0; k < places.length; k += 3) {
+                    const [p, q, r] = [0, 1, 2].map((l) => corner(places[k + l]));
+                    const cross = [0, 1, 2].map(
+                        (l) => q[(l + 1) % 3] * r[(l + 2) % 3] - q[(l + 2) % 3] * r[(l + 1) % 3],
+                    );
+                    volume += (p[0] * cross[0] + p[1] * cross[1] + p[2] * cross[2]) / 6;
+                }
+                found.push({ triangles: places.length / 3, volume: volume / stage.scale ** 3 });
+            }
+        });
+        return found;
+    });
+
+test("what closed meshes have in common is drawn and measured", { skip: WITHOUT }, async () => {
+    // A rod through a plate, which it pierces by its thickness, and through a face of two triangles: polygons with holes.
+    const scaled = (...sides) =>
+        box().replace(
+            /^v (.*)$/gm,
+            (_, row) =>
+                `v ${row
+                    .split(" ")
+                    .map((x, k) => x * sides[k])
+                    .join(" ")}`,
+        );
+    const files = [
+        ["plate.cbvh", baked("plate.obj", scaled(4, 3, 0.25))],
+        ["rod.cbvh", baked("rod.obj", scaled(0.5, 0.5, 2))],
+    ];
+    const at = (x, y, z) => [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z];
+    const { page, errors, close } = await open(filled(files, { kind: "pair", pose: at(1, 0.5, 0.25) }), { dark: true });
+    await page.waitForSelector("text=volume in both");
+    const facts = await factsIn(page, "#page-pair");
+    assert.deepEqual([Number(facts["A is pierced"]), facts["B is pierced"]], [0.25, undefined]);
+    assert.equal(facts["its box"], "0.5 0.5 0.25");
+    assert.ok(Math.abs(Number(facts["volume in both"]) - 0.0625) < 1e-15, facts["volume in both"]);
+    const [solid, ...more] = await solids(page);
+    assert.deepEqual(more, []);
+    assert.ok(Math.abs(solid.volume - 0.0625) < 1e-6, `${solid.volume}`);
+    await picture(page, "shared");
+    // Apart and touching meshes have nothing in common.
+    for (const pose of [at(1, 0.5, 1.125), at(1, 0.5, 2)]) {
+        const before = await page.getAttribute("html", "data-answer");
+        await page.evaluate((pose) => window.cbvhView.pair.setPose(Float64Array.from(pose)), pose);
+        await changed(page, before);
+        await page.waitForTimeout(500);
+        assert.deepEqual([await solids(page), await page.locator("text=volume in both").count()], [[], 0]);
+    }
+    assert.deepEqual(errors, []);
+    await close();
+});
+
 test("meshes that are not closed have no depth, and the page says which", { skip: WITHOUT }, async () => {
     // The ring without its first triangle.
     const holed = baked("holed.obj", ring(64, 32).replace(/^f .*\n/m, ""));
@@ -333,6 +403,7 @@ test("meshes that are not closed have no depth, and the page says which", { skip
             ),
         );
         await page.waitForSelector(`text=none, because ${names} not closed`);
+        assert.deepEqual([await solids(page), await page.locator("text=volume in both").count()], [[], 0]);
         assert.deepEqual(errors, []);
         await close();
     }
@@ -894,14 +965,36 @@ test("a clash report frames the chosen pair", { skip: WITHOUT }, async () => {
     const clashes = [
         { a: 0, b: 1, class: "overlapping", ...depth },
         { a: 0, b: 2, class: "near", distance: 0.8 },
+        { a: 0, b: 1, class: "piercing", ...depth, volume: 0.5, pierced: [null, 0.25] },
+        { a: 0, b: 1, class: "protruding", ...depth, volume: 0.125 },
     ];
     const show = { kind: "clash", instances, clashes };
     const { page, errors, close } = await open(filled(files, show));
     assert.equal(await state(page), "ready");
-    assert.equal(await page.locator(".list-row").count(), 2);
-    await page.locator(".list-row").first().click();
+    const rows = page.locator(".list-row");
+    assert.equal(await rows.count(), 4);
+    assert.match(await rows.nth(2).textContent(), /piercing.*volume 0\.5.*0\.25 pierced/);
+    assert.match(await rows.nth(3).textContent(), /protruding.*volume 0\.125$/);
+    assert.doesNotMatch(await rows.nth(0).textContent(), /volume|pierced/);
+    // Those that overlap have the colours of a hit.
+    const colours = await page
+        .locator(".badge")
+        .evaluateAll((badges) => badges.map((badge) => getComputedStyle(badge).color));
+    assert.deepEqual([colours[2], colours[3], colours[1] === colours[0]], [colours[0], colours[0], false]);
+    await rows.first().click();
     await page.waitForSelector(".clash-facts >> text=moves B out");
+    // The page measures what both have in common: the volume is that of the command.
+    await page.waitForSelector(".clash-facts >> text=its box");
+    const facts = await factsIn(page, ".clash-facts");
+    const [solid, ...more] = await solids(page);
+    assert.deepEqual(more, []);
+    const volume = Number(facts["volume in both"]);
+    assert.ok(volume > 0.1 && Math.abs(solid.volume - volume) < 1e-5 * volume, `${solid.volume} of ${volume}`);
     await picture(page, "clash");
+    // Parts that are apart have no solid.
+    await rows.nth(1).click();
+    await page.waitForTimeout(500);
+    assert.deepEqual(await solids(page), []);
     await page.selectOption('select[aria-label="Class of clashes"]', "near");
     assert.equal(await page.locator(".list-row").count(), 1);
     assert.deepEqual(errors, []);

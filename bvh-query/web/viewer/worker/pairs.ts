@@ -1,6 +1,6 @@
 /** Questions about two meshes: what is shown at once, and what takes longer. */
 
-import type { Distance, Penetration, Relation } from "../../ts/answers.js";
+import type { Distance, Intersection, IntersectionSurface, Penetration, Relation } from "../../ts/answers.js";
 import type { Mesh } from "../../ts/mesh.js";
 import { Motion } from "../../ts/motion.js";
 import { pose as poseOf, relative } from "../../ts/poses.js";
@@ -40,13 +40,23 @@ export interface DeepAnswer {
     patches: number;
     /** The curves in which triangles meet: ends of segments, 6 numbers for each. */
     curves: Float64Array;
+    shared: Shared | undefined;
     took: number;
+}
+
+/** What two closed meshes have in common: its measures, and its boundary. */
+export interface Shared {
+    measures: Intersection;
+    surface: IntersectionSurface;
 }
 
 /** More contacts than this are not joined into patches. */
 const MAX_JOINED_CONTACTS = 40_000;
 /** More patches than this are not shown. */
 const MAX_SHOWN_PATCHES = 60;
+
+/** What meshes of more triangles than this have in common is not measured. */
+const MAX_MEASURED_TRIANGLES = 200_000;
 
 /** Asks about two shapes, which may have margins. */
 function withShapes<T>(a: Side, b: Side, ask: (a: Mesh, b: Mesh) => T): T {
@@ -95,6 +105,16 @@ export function near(a: Side, b: Side, pose: Float64Array, within?: number): Nea
     });
 }
 
+/** Measures what two meshes have in common; `undefined` if there is nothing, if that is not known, or if it would take long. A radius has no
+ * part in it. */
+function sharedOf(a: Mesh, b: Mesh, pose: Float64Array, areClosed: boolean): Shared | undefined {
+    if (!areClosed || a.triangleCount + b.triangleCount > MAX_MEASURED_TRIANGLES || a.radius + b.radius > 0) {
+        return undefined;
+    }
+    const measures = a.intersection(b, pose);
+    return measures.volume > measures.volumeError ? { measures, surface: a.intersectionSurface(b, pose) } : undefined;
+}
+
 export function deep(a: Side, b: Side, pose: Float64Array): DeepAnswer {
     return withShapes(a, b, (first, second) => {
         const began = performance.now();
@@ -122,8 +142,18 @@ export function deep(a: Side, b: Side, pose: Float64Array): DeepAnswer {
             }
         });
         const [centres, normals] = [rows(found.center), rows(found.normal)];
+        const areClosed = [a, b].every((side) => file(side.file).closed === true);
+        const shared = sharedOf(first, second, pose, areClosed);
         const took = performance.now() - began;
-        return { depth, centres, normals, patches: found.count.length, curves: Float64Array.from(curves), took };
+        return {
+            depth,
+            centres,
+            normals,
+            patches: found.count.length,
+            curves: Float64Array.from(curves),
+            shared,
+            took,
+        };
     });
 }
 
