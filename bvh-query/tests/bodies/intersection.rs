@@ -415,3 +415,105 @@ fn open_meshes_have_no_volume() {
         }
     }
 }
+
+/// A tetrahedron with corners that are whole numbers below a limit, counterclockwise seen from outside.
+fn random_tetrahedron(random: &mut Random, limit: usize) -> [Triangle; 4] {
+    loop {
+        let corners = [(); 4].map(|()| [(); 3].map(|()| random.below(limit) as f64));
+        let [u, v, w] = [1, 2, 3].map(|n| [0, 1, 2].map(|k| corners[n][k] - corners[0][k]));
+        let six = u[0] * (v[1] * w[2] - v[2] * w[1])
+            + u[1] * (v[2] * w[0] - v[0] * w[2])
+            + u[2] * (v[0] * w[1] - v[1] * w[0]);
+        let [p, q, r, s] = corners;
+        if six != 0.0 {
+            let [q, r] = if six > 0.0 { [q, r] } else { [r, q] };
+            return [[p, r, q], [p, q, s], [q, r, s], [r, p, s]];
+        }
+    }
+}
+
+/// The volume that two tetrahedra have in common, by their planes.
+fn common_volume(a: &[Triangle], b: &[Triangle]) -> f64 {
+    let mut planes: Vec<(Point, f64)> = Vec::new();
+    for [p, q, r] in a.iter().chain(b) {
+        let [u, v] = [q, r].map(|x| [0, 1, 2].map(|k| x[k] - p[k]));
+        let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let normal = normal.map(|x| x / length);
+        let plane = (normal, normal.iter().zip(p).map(|(x, y)| x * y).sum::<f64>());
+        let is_known = |sign: f64| {
+            let differs = |x: f64, y: f64| (x - sign * y).abs() > 1e-12;
+            let is_it = |known: &(Point, f64)| {
+                !differs(known.1, plane.1) && (0..3).all(|k| !differs(known.0[k], plane.0[k]))
+            };
+            planes.iter().any(is_it)
+        };
+        // Nothing but a plane is between two that face each other.
+        if is_known(-1.0) {
+            return 0.0;
+        }
+        if !is_known(1.0) {
+            planes.push(plane);
+        }
+    }
+    clipped_volume(&planes)
+}
+
+/// Tetrahedra whose corners are whole numbers from 2^52 on: all points of what they have in common may be rounded to one.
+#[test]
+fn volumes_are_certain_where_all_points_are_rounded_to_one() {
+    let (mut queriers, mut random) = (queriers(), Random::new(52));
+    let mut flat = 0;
+    for round in 0..400 {
+        let limit = [3, 5, 9, 40][round % 4];
+        let near = [(); 2].map(|()| random_tetrahedron(&mut random, limit));
+        let [a, b] = near.map(|of| of.map(|triangle| triangle.map(|p| p.map(|x| x + 2f64.powi(52)))));
+        let volume = common_volume(&near[0], &near[1]);
+        let found = intersection(&mut queriers, &baked(&a), &baked(&b), &Pose::IDENTITY);
+        flat += usize::from(found.volume == 0.0 && volume > 1e-9);
+        assert!((found.volume - volume).abs() <= found.volume_error + 1e-9, "{round} {found:?} {volume}");
+    }
+    assert!(flat > 0);
+}
+
+/// Volumes add up, each as often as surfaces wind around it: parts that overlap, have corners, edges and faces in common, or are there
+/// twice, and some of them inside out.
+#[test]
+fn volumes_of_parts_add_up() {
+    let (mut queriers, mut random) = (queriers(), Random::new(17));
+    let mut shared = 0;
+    for round in 0..400 {
+        let limit = [3, 4, 6][round % 3];
+        let mut parts = || {
+            let mut parts: Vec<([Triangle; 4], f64)> = Vec::new();
+            for _ in 0..1 + random.below(4) {
+                let mut part = random_tetrahedron(&mut random, limit);
+                if random.below(4) == 0
+                    && let Some((known, _)) = parts.last()
+                {
+                    part = *known;
+                }
+                parts.push((part, if random.below(3) == 0 { -1.0 } else { 1.0 }));
+            }
+            parts
+        };
+        let (a, b) = (parts(), parts());
+        let mesh = |parts: &[([Triangle; 4], f64)]| -> Vec<Triangle> {
+            let turned = |(part, sign): &([Triangle; 4], f64)| {
+                part.map(|[p, q, r]| if *sign > 0.0 { [p, q, r] } else { [p, r, q] })
+            };
+            parts.iter().flat_map(turned).collect()
+        };
+        let (mesh_a, mesh_b) = (mesh(&a), mesh(&b));
+        let volume: f64 = a
+            .iter()
+            .flat_map(|(of_a, sign)| {
+                b.iter().map(move |(of_b, other)| sign * other * common_volume(of_a, of_b))
+            })
+            .sum();
+        let found = intersection(&mut queriers, &baked(&mesh_a), &baked(&mesh_b), &Pose::IDENTITY);
+        assert!((found.volume - volume.abs()).abs() <= 1e-11, "{round} {found:?} {volume}");
+        shared += usize::from(volume != 0.0);
+    }
+    assert!(shared > 100, "{shared}");
+}

@@ -8,7 +8,8 @@
 //! # Error
 //! A point is off by its own error and by the rounding of its difference from the middle. With X, Y and Z for the largest coordinates of
 //! three points and x, y and z for what they are off, their determinant has six products of three coordinates and is off by at most
-//! 6 (x Y Z + X y Z + X Y z) and some roundings of 6 X Y Z; the sum of all is rounded as often as a compensated sum is.
+//! 6 ((X + x) (Y + y) (Z + z) - X Y Z) and some roundings of 6 X Y Z; the sum of all is rounded as often as a compensated sum is. Points
+//! far from the origin may be off by more than they are apart, so that no product of what they are off may be left out.
 
 use crate::narrow::{Point, cross, dot, subtract};
 use crate::numerics::UNIT_ROUNDOFF;
@@ -23,6 +24,7 @@ struct Sum {
     lost: f64,
     magnitude: f64,
     error: f64,
+    terms: u64,
 }
 
 impl Sum {
@@ -34,15 +36,18 @@ impl Sum {
         self.value = sum;
         self.magnitude += term.abs();
         self.error += error;
+        self.terms += 1;
     }
 
-    /// Returns the sum and how far it is at most from the exact one.
+    /// Returns the sum, which may be divided once, and how far it is then at most from the exact one.
     ///
-    /// What is lost is itself a sum of rounded numbers, each at most a rounding of the magnitude, and there are fewer than 2^32 of them.
+    /// What is lost is itself a sum: of n numbers, each at most a rounding of the magnitude. So it is never more than n roundings of
+    /// the magnitude, and each of its n sums is off by at most a rounding of that. Sums of fewer than 2^32 magnitudes and errors are
+    /// off by less than a part of 2^20.
     fn total(&self) -> (f64, f64) {
         let total = self.value + self.lost;
-        let roundings =
-            2.0 * UNIT_ROUNDOFF * total.abs() + self.magnitude * (UNIT_ROUNDOFF / (1u64 << 16) as f64);
+        let of_lost = self.terms as f64 * UNIT_ROUNDOFF;
+        let roundings = 2.0 * UNIT_ROUNDOFF * total.abs() + self.magnitude * of_lost * of_lost;
         (total, (self.error + roundings) * (1.0 + 1.0 / (1u64 << 20) as f64))
     }
 }
@@ -80,8 +85,10 @@ impl Measure {
             let weight = arc.weight as f64;
             let spanned = dot(base.point, cross(p.point, q.point));
             let product = base.size * p.size * q.size;
-            let moved = base.error * p.size * q.size + base.size * (p.error * q.size + p.size * q.error);
-            let error = 6.0 * (moved + 8.0 * UNIT_ROUNDOFF * product);
+            let moved_ends = p.error * (q.size + q.error) + p.size * q.error;
+            let moved = base.error * (p.size + p.error) * (q.size + q.error) + base.size * moved_ends;
+            // Products of tiny numbers underflow.
+            let error = 6.0 * (moved + 8.0 * UNIT_ROUNDOFF * product) + f64::MIN_POSITIVE;
             self.volume.add(weight * spanned, weight.abs() * error);
             let turned = cross(subtract(p.point, base.point), subtract(q.point, base.point));
             area = [0, 1, 2].map(|k| area[k] + weight * turned[k]);
