@@ -33,10 +33,11 @@ pub(crate) struct EdgeCrossing {
 }
 
 /// Returns the ends of the segment that two triangles have in common, from which it leads along the cross product of A's normal and
-/// B's to which; nothing if the moved triangles have nothing in common.
+/// B's to which; nothing if the moved triangles have nothing in common. If one triangle has no area, both ends are edges of it that
+/// pass through the other one in the same place.
 pub(crate) fn edge_crossings(a: &Triangle, b: &Triangle) -> Option<[EdgeCrossing; 2]> {
-    let (fronts_a, fronts_b) = (fronts(b, a, 1.0)?, fronts(a, b, -1.0)?);
-    let is_apart = |fronts: [bool; 3]| fronts == [true; 3] || fronts == [false; 3];
+    let (fronts_a, fronts_b) = (fronts(b, a, 1.0), fronts(a, b, -1.0));
+    let is_apart = |fronts: Option<[bool; 3]>| fronts == Some([true; 3]) || fronts == Some([false; 3]);
     if is_apart(fronts_a) || is_apart(fronts_b) {
         return None;
     }
@@ -45,10 +46,9 @@ pub(crate) fn edge_crossings(a: &Triangle, b: &Triangle) -> Option<[EdgeCrossing
     let (mut start, mut end) = (None, None);
     for edge in 0..3 {
         for (is_of_a, fronts, corners, plane) in [(true, fronts_a, a, b), (false, fronts_b, b, a)] {
+            // No edge passes through a triangle without area, but its own edges pass through the other one.
+            let Some(fronts) = fronts.filter(|fronts| fronts[edge] != fronts[next(edge)]) else { continue };
             let enters = fronts[edge];
-            if enters == fronts[next(edge)] {
-                continue;
-            }
             let sides =
                 [0, 1, 2].map(|other| if is_of_a { passes(edge, other) } else { passes(other, edge) });
             if sides[0] != sides[1] || sides[1] != sides[2] {

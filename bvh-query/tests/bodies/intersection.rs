@@ -517,3 +517,34 @@ fn volumes_of_parts_add_up() {
     }
     assert!(shared > 100, "{shared}");
 }
+
+/// Triangles without area beside each other have edges that no other triangle has.
+#[test]
+fn triangles_without_area_are_no_gaps() {
+    let mut queriers = queriers();
+    let plain = block([-1.0, -0.5, -0.25], [1.0, 0.5, 0.25]);
+    let mut divided = Vec::new();
+    for &[p, q, r] in &plain {
+        let between = |part: f64| [0, 1, 2].map(|k| p[k] + part * (q[k] - p[k]));
+        let (n, m) = (between(0.25), between(0.5));
+        divided.extend([[p, m, r], [m, q, r], [p, n, m], [n, q, m], [p, q, n]]);
+    }
+    let mut random = Random::new(6);
+    let duct = pipe(0.2, 0.1, 1.0);
+    for round in 0..40 {
+        let shift = random.point().map(|x| 0.5 * x);
+        let pose = Pose::new([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], shift).unwrap();
+        let [one, two] =
+            [&plain, &divided].map(|of| intersection(&mut queriers, &baked(&duct), &baked(of), &pose));
+        assert!((one.volume - two.volume).abs() <= 1e-13, "{round} {one:?} {two:?}");
+        let same = |x: Option<f64>, y: Option<f64>| match (x, y) {
+            (Some(x), Some(y)) => (x - y).abs() < 1e-12,
+            (None, None) => true,
+            _ => false,
+        };
+        assert!(
+            same(one.pierced_a, two.pierced_a) && same(one.pierced_b, two.pierced_b),
+            "{round} {one:?} {two:?}"
+        );
+    }
+}
