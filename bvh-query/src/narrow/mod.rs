@@ -34,7 +34,7 @@ mod within;
 pub(crate) use contact_region::{MAX_POINTS, common_region, unit, unit_normal};
 pub(crate) use convex_solid::{ConvexSolid, Enclosed, has_area};
 pub(crate) use edge_crossing::{EdgeCrossing, edge_crossings};
-pub(crate) use intersection::{area_axis, segment_intersects, triangles_intersect};
+pub(crate) use intersection::{segment_intersects, triangles_intersect};
 pub(crate) use point_distance::point_distance;
 pub(crate) use ray_crossing::{Crossing, Ray};
 pub(crate) use rounded_ray::rounded_crossing;

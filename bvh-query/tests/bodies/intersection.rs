@@ -518,6 +518,50 @@ fn volumes_of_parts_add_up() {
     assert!(shared > 100, "{shared}");
 }
 
+/// A quarter of a turn by rounded numbers leaves normals with a component of about 1e-16, which is no axis to look along. Lines around
+/// parts lead the other way around where one of the meshes is turned inside out.
+#[test]
+fn holes_are_holes_however_faces_are_turned() {
+    let mut queriers = queriers();
+    let wall = block([-3.0, -0.1, -2.0], [3.0, 0.1, 2.0]);
+    // Beside the diagonals of the wall's faces.
+    let duct = moved(&pipe(0.3, 0.2, 1.2), 1.0, [1.0, 0.0, -1.2]);
+    let inside_out = |of: &[Triangle]| of.iter().map(|&[p, q, r]| [p, r, q]).collect::<Vec<_>>();
+    let (sin, cos) = std::f64::consts::FRAC_PI_2.sin_cos();
+    let turns = [
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]],
+        [[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]],
+        [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]],
+    ];
+    for turn in turns {
+        for other in turns {
+            // Both turned together twice.
+            let place = |p: Point| {
+                let by = |turn: [Point; 3], p: Point| {
+                    turn.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2])
+                };
+                by(other, by(turn, p))
+            };
+            let placed = |of: &[Triangle]| of.iter().map(|triangle| triangle.map(place)).collect::<Vec<_>>();
+            for (wall, duct) in [
+                (wall.clone(), duct.clone()),
+                (inside_out(&wall), duct.clone()),
+                (wall.clone(), inside_out(&duct)),
+                (inside_out(&wall), inside_out(&duct)),
+            ] {
+                let (of_duct, of_wall) = (baked(&placed(&duct)), baked(&placed(&wall)));
+                let found = intersection(&mut queriers, &of_duct, &of_wall, &Pose::IDENTITY);
+                let is_right = found.pierced_b.is_some_and(|thickness| (thickness - 0.2).abs() < 1e-12);
+                assert!(is_right, "{turn:?} {other:?} {found:?}");
+                let surface = queriers[0].intersection_surface(&of_duct, &of_wall, &Pose::IDENTITY).unwrap();
+                // Both sides of the wall have a ring.
+                assert_eq!(surface.loops.len() - surface.polygons.len(), 2, "{turn:?} {other:?}");
+            }
+        }
+    }
+}
+
 /// Triangles without area beside each other have edges that no other triangle has.
 #[test]
 fn triangles_without_area_are_no_gaps() {

@@ -7,9 +7,9 @@
 //! Parts meet where they have a node in common. Within one face they also do if one of them is a hole in the other.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, Triangle, area_axis, dot, subtract, triangle_distance};
+use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
 use crate::query::intersection::cuts::{Arc, Cuts, Node};
-use crate::query::intersection::polygons::{COMPARISONS, goes_around, polygons};
+use crate::query::intersection::polygons::{COMPARISONS, goes_around, polygons, steepest_axis};
 use crate::query::intersection::surface::Surface;
 use crate::traverse::budget::Budget;
 use std::collections::BTreeMap;
@@ -122,28 +122,29 @@ impl Parts {
             }
         }
         parts.retain(|_, first| first.is_none());
-        let mut least = None;
-        for &piece in parts.keys() {
-            let mut pieces = Vec::new();
-            for (face, range) in faces {
-                // One face may have several parts.
-                let mut lines: BTreeMap<u32, Vec<[Point; 2]>> = BTreeMap::new();
-                for arc in all[range.clone()].iter().filter(|arc| of_both.root(arc.from) == piece) {
-                    let line = [arc.from, arc.to].map(|node| cuts.nodes[node as usize].point);
-                    lines.entry(own.root(arc.from)).or_default().push(line);
-                }
-                let triangle = surface.triangle(*face);
-                for (part, lines) in lines {
-                    if surface.faces[*face as usize].is_cut {
-                        pieces
-                            .extend(lines.iter().map(|line| Piece::new(PieceShape::Line(*line), part, line)));
-                        let bounds = lines.as_flattened().to_vec();
-                        pieces.push(Piece::new(PieceShape::Inside(triangle, lines), part, &bounds));
-                    } else {
-                        pieces.push(Piece::new(PieceShape::Whole(triangle), part, &triangle));
-                    }
+        let mut by_piece: BTreeMap<u32, Vec<Piece>> =
+            parts.keys().map(|&piece| (piece, Vec::new())).collect();
+        for (face, range) in faces {
+            // One face may have several parts, of several pieces.
+            let mut lines: BTreeMap<[u32; 2], Vec<[Point; 2]>> = BTreeMap::new();
+            for arc in &all[range.clone()] {
+                let line = [arc.from, arc.to].map(|node| cuts.nodes[node as usize].point);
+                lines.entry([of_both.root(arc.from), own.root(arc.from)]).or_default().push(line);
+            }
+            let triangle = surface.triangle(*face);
+            for ([piece, part], lines) in lines {
+                let Some(pieces) = by_piece.get_mut(&piece) else { continue };
+                if surface.faces[*face as usize].is_cut {
+                    pieces.extend(lines.iter().map(|line| Piece::new(PieceShape::Line(*line), part, line)));
+                    let bounds = lines.as_flattened().to_vec();
+                    pieces.push(Piece::new(PieceShape::Inside(triangle, lines), part, &bounds));
+                } else {
+                    pieces.push(Piece::new(PieceShape::Whole(triangle), part, &triangle));
                 }
             }
+        }
+        let mut least = None;
+        for mut pieces in by_piece.into_values() {
             let found = Tree::new(&mut pieces).least(budget)?;
             least = Some(least.map_or(found, |least: f64| least.min(found)));
         }
@@ -199,7 +200,7 @@ impl Piece {
 
 /// Returns whether lines in the plane of a triangle go around a point of it.
 fn is_around(outline: &[[Point; 2]], triangle: &Triangle, point: Point) -> bool {
-    let axis = area_axis(triangle);
+    let axis = steepest_axis(triangle);
     let flat = |point: Point| [point[(axis + 1) % 3], point[(axis + 2) % 3]];
     goes_around(outline.iter().map(|line| line.map(flat)), flat(point))
 }

@@ -1,7 +1,7 @@
 //! The parts of a face as polygons: closed ways along the lines around them, and which of these are holes in which.
 
 use crate::error::QueryError;
-use crate::narrow::{Triangle, area_axis};
+use crate::narrow::{Point, Triangle, cross, subtract};
 use crate::query::intersection::cuts::{Arc, Node};
 use crate::traverse::budget::Budget;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ const MAX_WEIGHT: u64 = 8;
 pub(super) type Polygon = Vec<Vec<u32>>;
 
 /// Returns the parts of a face, given the lines around them. Outlines go around them as the corners of the triangle do, and holes the
-/// other way.
+/// other way; the reverse if the other mesh is turned inside out.
 pub(super) fn polygons(
     nodes: &[Node],
     triangle: &Triangle,
@@ -27,7 +27,7 @@ pub(super) fn polygons(
     if ways.len() < 2 {
         return Ok(ways.pop().map(|way| vec![way]).into_iter().collect());
     }
-    let axis = area_axis(triangle);
+    let axis = steepest_axis(triangle);
     let flatten = |point: [f64; 3]| [point[(axis + 1) % 3], point[(axis + 2) % 3]];
     let flat = |node: u32| flatten(nodes[node as usize].point);
     let turn =
@@ -39,8 +39,11 @@ pub(super) fn polygons(
         orientation * way.windows(2).map(|pair| turn(first, flat(pair[0]), flat(pair[1]))).sum::<f64>()
     };
     let (mut outlines, mut holes): (Vec<(f64, Polygon)>, Vec<Vec<u32>>) = (Vec::new(), Vec::new());
-    for way in ways {
-        let area = area(&way);
+    let areas: Vec<f64> = ways.iter().map(|way| area(way)).collect();
+    // Outlines have more area than their holes. All ways lead the other way around where one mesh is turned inside out.
+    let sign = if areas.iter().sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+    for (way, area) in ways.into_iter().zip(areas) {
+        let area = sign * area;
         if area < 0.0 {
             holes.push(way);
         } else {
@@ -63,6 +66,13 @@ pub(super) fn polygons(
         }
     }
     Ok(outlines.into_iter().map(|(_, polygon)| polygon).collect())
+}
+
+/// Returns the axis along which a triangle is seen best: that of the largest component of its normal. A normal that is rounded has
+/// components near 0 that tell nothing.
+pub(super) fn steepest_axis([p, q, r]: &Triangle) -> usize {
+    let normal: Point = cross(subtract(*q, *p), subtract(*r, *p));
+    (1..3).fold(0, |best, axis| if normal[axis].abs() > normal[best].abs() { axis } else { best })
 }
 
 /// Returns whether lines in a plane go around a point.
