@@ -94,7 +94,9 @@ impl Querier {
     /// two sides there. Two plates that cross may pierce each other.
     ///
     /// **Flush faces.** The answer is that for a B moved by less than any number, towards less y, then less z, then less x. So a common
-    /// face encloses nothing, it belongs to the surface of either A or B, and whether parts meet along it follows from that move.
+    /// face encloses nothing. Of two solids on one side of it, it belongs to the surface of either A or B. Of solids on both sides, it
+    /// belongs to both surfaces if the move is towards A, and then is in the box; else to neither. Whether parts meet along it follows
+    /// from that move, too.
     ///
     /// All numbers have the same bits on all backends. Radii are left out. Cost: that of [`Querier::contacts`], some 0.5 us for each of
     /// them, and some 0.1 us and 100 bytes for each triangle in the box of the other mesh.
