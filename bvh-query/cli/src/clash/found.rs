@@ -22,8 +22,8 @@ pub(super) struct Found<'a> {
     pub(super) translation: Option<[f64; 3]>,
     /// What both have in common, where that is asked for and known.
     pub(super) shared: Option<Intersection>,
-    /// Which parts are not closed, if that is why magnitudes that were asked for are not known.
-    open: Option<[bool; 2]>,
+    /// Why magnitudes that were asked for are not known, in words.
+    reason: Option<&'static str>,
     pub(super) point: [f64; 3],
     /// How the clash compares with that of the baseline.
     pub(super) status: Option<Status>,
@@ -77,7 +77,7 @@ impl<'a> Found<'a> {
             depth: clash.depth.map(|depth| [depth.lower, depth.upper]),
             translation: clash.depth.filter(|_| clash.distance == 0.0).map(|depth| turn(depth.translation)),
             shared: clash.magnitudes,
-            open: None,
+            reason: None,
             point: world.place(clash.point),
             status: None,
         }
@@ -94,7 +94,7 @@ impl<'a> Found<'a> {
             depth: None,
             translation: None,
             shared: None,
-            open: None,
+            reason: None,
             point: centre(&assembly.parts[parts[0]].bounds()),
             status: None,
         }
@@ -129,7 +129,7 @@ impl<'a> Found<'a> {
     pub(super) fn may_share(&self, volume: f64) -> bool {
         match self.shared {
             Some(shared) => shared.volume + shared.volume_error >= volume,
-            None => self.class == ClashClass::Intersecting,
+            None => self.reason.is_some(),
         }
     }
 
@@ -140,25 +140,23 @@ impl<'a> Found<'a> {
         }
         let [first, second] = self.parts.map(|number| &assembly.parts[number]);
         let (a, b) = (first.shape.opened()?, second.shape.opened()?);
-        let open = [!a.shape().is_closed()?, !b.shape().is_closed()?];
-        if open != [false; 2] {
-            self.open = Some(open);
-        } else if self.class == ClashClass::Duplicated {
+        self.reason = match [a.shape(), b.shape()].map(|shape| shape.is_closed()) {
+            [Err(error), _] | [_, Err(error)] => return Err(error),
+            [Ok(false), Ok(false)] => Some("both are not closed"),
+            [Ok(false), _] => Some("a is not closed"),
+            [_, Ok(false)] => Some("b is not closed"),
+            _ if first.margin + second.margin + a.shape().radius() + b.shape().radius() > 0.0 => {
+                Some("a part has a margin")
+            }
+            _ => None,
+        };
+        if self.reason.is_none() && self.class == ClashClass::Duplicated {
             // Copies are in one place.
             let mut shared = querier.intersection(a.shape(), b.shape(), &Pose::IDENTITY)?;
             shared.bounds = Some(first.bounds());
             self.shared = Some(shared);
         }
         Ok(())
-    }
-
-    /// Returns why magnitudes are not known, in words.
-    fn reason(&self) -> Option<&'static str> {
-        match self.open? {
-            [true, true] => Some("both are not closed"),
-            [true, false] => Some("a is not closed"),
-            _ => Some("b is not closed"),
-        }
     }
 
     /// Returns whether a class that was named is that of the clash: overlapping stands for piercing and protruding, too.
@@ -176,14 +174,14 @@ impl<'a> Found<'a> {
         let shared = self.shared;
         self.named()
             .with(record! { translation: self.translation, point: self.point })
-            .with((shared.is_some() || self.open.is_some()).then(|| {
+            .with((shared.is_some() || self.reason.is_some()).then(|| {
                 record! {
                     volume: shared.map(|shared| shared.volume),
                     volume_error: shared.map(|shared| shared.volume_error),
                     area: shared.map(|shared| [shared.area_a, shared.area_b]),
                     pierced: shared.map(|shared| [shared.pierced_a, shared.pierced_b]),
                     box: shared.map(|shared| shared.bounds),
-                    reason: self.reason(),
+                    reason: self.reason,
                 }
             }))
             .with(self.status.map(|status| record! { status: status.name() }))
@@ -260,7 +258,7 @@ impl<'a> Found<'a> {
                 Some(format!("{} of the {which} pierced", short(thickness?)))
             }));
         }
-        words.extend(self.reason().map(str::to_owned));
+        words.extend(self.reason.map(str::to_owned));
         words.retain(|words| !words.is_empty());
         words.join(", ")
     }

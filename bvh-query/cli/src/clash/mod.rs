@@ -52,9 +52,9 @@ Each pair that is not apart is a clash of one class:
   protruding    they overlap, and neither passes through the other
 
 It tells the volume, with a certified bound of its error, the area of each surface in it, its box in the world, and how thick a part is \
-where another one pierces it: the least distance between where that one enters and leaves. Parts that are not closed have no magnitudes; \
-near and touching ones share nothing. --fail-on overlapping is about piercing and protruding ones, too. --sort volume lists the \
-largest volumes first, and --min-volume leaves out what shares less, but for intersecting parts, whose volume is unknown.
+where another one pierces it: the least distance between where that one enters and leaves. Parts that are not closed or have a margin have no \
+magnitudes; near and touching ones share nothing. --fail-on overlapping is about piercing and protruding ones, too. --sort volume lists the \
+largest volumes first, and --min-volume leaves out what shares less, but for parts whose volume is unknown.
 
 The list has them in this order, deep ones and near ones first. The depth is the length of the shortest move of the second part \
 after which they do not overlap; it is certainly between the two bounds. --visits limits the search for it, for each pair. \

@@ -113,7 +113,7 @@ options! {
         /// The most visits of the search for the depth of a pair: see [`Querier::set_budget`], whose budget limits it, too.
         visits(u64): u64 = 1 << 20,
         /// Whether to measure what parts have in common ([`Querier::intersection`]), and to divide overlapping ones into piercing and
-        /// protruding ones.
+        /// protruding ones. Parts with a radius or a margin are not measured.
         magnitudes(bool): bool = false,
     }
 }
@@ -169,7 +169,8 @@ impl Querier {
         let mut clash = self.clash_of(a, b, pose, options)?;
         use ClashClass::{Contained, Duplicated, Overlapping, Piercing, Protruding, Undecided};
         let is_shared = matches!(clash.class, Overlapping | Undecided | Contained | Duplicated);
-        if options.magnitudes && is_shared && a.is_closed()? && b.is_closed()? {
+        let is_measured = options.magnitudes && is_shared && sum_of_radii(a, b) == 0.0;
+        if is_measured && a.is_closed()? && b.is_closed()? {
             let shared = self.intersection_along(a, b, pose, axes)?;
             if clash.class == Overlapping {
                 let pierces = shared.pierced_a.or(shared.pierced_b).is_some();

@@ -99,7 +99,8 @@ impl Querier {
     /// from that move, too.
     ///
     /// All numbers have the same bits on all backends. Radii are left out. Cost: that of [`Querier::contacts`], some 0.5 us for each of
-    /// them, and some 0.1 us and 100 bytes for each triangle in the box of the other mesh.
+    /// them, and some 0.1 us and 100 bytes for each triangle in the box of the other mesh; more, up to some 20 us for each contact, where
+    /// hundreds of thousands of them lie in a few faces.
     ///
     /// # Errors
     /// [`QueryError::NotClosed`] if an object of a shape has no inside; [`QueryError::NoTopology`] if a file was baked without topology;

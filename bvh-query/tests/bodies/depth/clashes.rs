@@ -90,6 +90,10 @@ fn overlapping_parts_pierce_or_protrude() {
             assert_eq!((found.class, found.magnitudes.is_some()), (class, has), "{found:?}");
         }
     }
+    // Cores share nothing where radii overlap.
+    let round = wall.all().rounded(0.5).unwrap();
+    let found = Querier::new().unwrap().clash(round, round, &translation(0.0, 1.0, 0.125), &options).unwrap();
+    assert_eq!((found.class, found.magnitudes), (ClashClass::Overlapping, None));
     let turned = Pose::new([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [10.0, 20.0, 30.0]).unwrap();
     let beside = Pose::new(*turned.rotation(), turned.place([0.0, 1.0, 0.0])).unwrap();
     let mut scene = Scene::new().unwrap();
