@@ -1,6 +1,6 @@
 //! The signed distance of a scene: that of the pair which overlaps most or, where none does, which is nearest.
 
-use crate::query::depth::penetration::PenetrationOptions;
+use crate::query::depth::options::PenetrationOptions;
 use crate::query::depth::signed_distance::SignedDistance;
 use crate::scene::pair_questions::ScenePair;
 use crate::scene::{Scene, SceneError};

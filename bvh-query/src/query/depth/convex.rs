@@ -5,7 +5,7 @@ use crate::file::shape::Shape;
 use crate::narrow::{ConvexSolid, Enclosed, Point, dot, subtract};
 use crate::numerics::UNIT_ROUNDOFF;
 use crate::pose::Pose;
-use crate::query::depth::penetration::PenetrationOptions;
+use crate::query::depth::options::PenetrationOptions;
 use crate::query::depth::polytope::{Corner, Face, Polytope};
 use crate::query::depth::translation::{Translation, length_above};
 use crate::query::querier::Querier;

@@ -5,6 +5,7 @@ pub(crate) mod clash;
 mod convex;
 mod free;
 mod leaving;
+pub(crate) mod options;
 pub(crate) mod penetration;
 mod pieces;
 mod planes;

@@ -1,8 +1,9 @@
 //! What two meshes have in common: its volume, its box, and how thick the one is where the other passes through it.
 //!
 //! ```text
-//! surface   the triangles of each mesh in the other's box, with shared vertices, and how often the other one winds around them
+//! surface   the triangles of each mesh in the other's box, with shared vertices
 //! cuts      where triangles pass through each other: points and segments, decided exactly
+//! windings  how often the other mesh winds around vertices
 //! measure   volume, areas and box
 //! polygons  the parts of a face, with their holes
 //! pierced   which parts of a surface are connected, and how far apart those are that are not
@@ -16,13 +17,14 @@ mod measure;
 mod pierced;
 mod polygons;
 mod surface;
+mod windings;
 
 use crate::error::QueryError;
 use crate::file::shape::Shape;
 use crate::leaf::queue::{TrianglePair, TriangleQueue};
 use crate::pose::Pose;
 use crate::query::depth::balls::bounds;
-use crate::query::depth::penetration::check_closed;
+use crate::query::depth::options::check_closed;
 use crate::query::intersection::cuts::Cuts;
 use crate::query::intersection::measure::Measure;
 use crate::query::intersection::pierced::Parts;
