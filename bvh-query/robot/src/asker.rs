@@ -36,7 +36,7 @@ impl Asker {
         Ok(Self::with(Querier::new()?))
     }
 
-    fn with(querier: Querier) -> Self {
+    pub(crate) fn with(querier: Querier) -> Self {
         Self { querier, groups: Vec::new(), centres: Vec::new(), slack: 0.0, likely: usize::MAX }
     }
 

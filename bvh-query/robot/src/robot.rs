@@ -10,7 +10,7 @@ use crate::shapes::Shapes;
 use crate::source::Source;
 use crate::srdf::{self, Group, Semantics, State};
 use crate::urdf::{self, Element};
-use bvh_query::{NumberError, OwnedShape, Pose, QueryError};
+use bvh_query::{Backend, NumberError, OwnedShape, Pose, Querier, QueryError};
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -147,6 +147,18 @@ impl Robot {
     pub fn snapshot(&mut self) -> Self {
         self.refresh();
         self.clone()
+    }
+
+    /// Returns the backend that answers questions: the one that `CBVH_ISA` names or the fastest one of this CPU, unless
+    /// [`Robot::set_backend`] has set another one.
+    pub fn backend(&self) -> Backend {
+        self.asker.querier.backend()
+    }
+
+    /// Sets the backend that answers questions from now on. Answers do not depend on it. The portable backend replaces one that the
+    /// CPU lacks. A clone has the backend of the original.
+    pub fn set_backend(&mut self, backend: Backend) {
+        self.asker = Asker::with(Querier::with_backend(backend));
     }
 
     /// Returns the name of the robot.

@@ -1,7 +1,7 @@
 //! Answers about robots against the same questions to a scene, pair by pair, and against many samples of motions.
 
 use bvh_bake::{Options, shapes, to_bytes};
-use bvh_query::{Bvh, MotionOptions, OwnedShape, PenetrationOptions, Pose, Querier};
+use bvh_query::{Backend, Bvh, MotionOptions, OwnedShape, PenetrationOptions, Pose, Querier};
 use cbvh_robot::{Base, Edge, Robot, RobotMotion, RobotOptions};
 use cbvh_testkit::Random;
 use std::path::Path;
@@ -305,4 +305,22 @@ fn pairs_that_touch_often_are_allowed() {
     let rest = before.into_iter().filter(|pair| !allowed.contains(pair));
     assert!(robot.pairs().into_iter().eq(rest) && !robot.pairs().is_empty());
     assert_eq!(robot.allow_frequent(50, 0.5).unwrap(), []);
+}
+
+#[test]
+fn answers_do_not_depend_on_the_backend() {
+    let mut robot = cell(Base::Fixed);
+    let mut other = robot.clone();
+    other.set_backend(Backend::Scalar);
+    assert_eq!([other.backend(), other.clone().backend()], [Backend::Scalar; 2]);
+    assert_eq!(robot.backend(), Backend::detect().unwrap());
+    let random = &mut Random::new(83);
+    for _ in 0..50 {
+        let joints = random_values(random, &robot);
+        assert_eq!(robot.distance(&joints).unwrap(), other.distance(&joints).unwrap());
+        assert_eq!(robot.collide(&joints).unwrap(), other.collide(&joints).unwrap());
+        let edge = Edge::straight(&joints, &random_values(random, &robot)).unwrap();
+        let options = MotionOptions::new().tolerance(1e-3);
+        assert_eq!(robot.motion(&edge, &options).unwrap(), other.motion(&edge, &options).unwrap());
+    }
 }
