@@ -1,7 +1,7 @@
 //! The command `cbvh`: bakes meshes into `.cbvh` files, shows what files contain, checks them and queries them.
 //!
 //! Each of these modules does one thing that a person does with the command: `bake` one output, or many `assets`;
-//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `clash`; `view`; `suite`; `report`. They import these modules, which do not import them:
+//! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `robot`; `clash`; `view`; `suite`; `report`. They import these modules, which do not import them:
 //! `asking` (the common part of commands that ask questions), `options` (options of several commands), `process`
 //! (memory, mapped files and signals) and `console` (output and exit codes). `cbvh --help` and the help of each
 //! command state what scripts may rely on.
@@ -20,6 +20,7 @@ mod probe;
 mod process;
 mod query;
 mod report;
+mod robot;
 mod scene;
 mod suite;
 mod view;
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Command::Motion(arguments) => motion::run(&arguments),
         Command::Probe(arguments) => probe::run(&arguments),
         Command::Scene(arguments) => scene::run(&arguments),
+        Command::Robot(arguments) => robot::run(&arguments),
         Command::Clash(arguments) => clash::run(&arguments),
         Command::View(arguments) => view::run(&arguments),
         Command::Suite(arguments) => suite::run(&arguments),
@@ -83,6 +85,8 @@ enum Command {
     Probe(probe::ProbeArguments),
     /// Ask a scene of many placed meshes which of them touch, or how far apart they are
     Scene(scene::SceneArguments),
+    /// Ask a robot about values of its joints: whether it touches itself or obstacles, how near it comes, and which motions are free
+    Robot(robot::RobotArguments),
     /// Find the parts of an assembly that touch, overlap, contain or come near each other, and how deep or how near
     Clash(clash::ClashArguments),
     /// Write a page that shows meshes, a motion or a scene in a browser, and asks cbvh there
@@ -101,7 +105,7 @@ fn failure(error: &clap::Error) -> Failure {
     }
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return Failure::Usage(
-            "expected a command: bake, dump, validate, verify, query, motion, probe, scene, clash, view, suite or report (see cbvh --help)"
+            "expected a command: bake, dump, validate, verify, query, motion, probe, scene, robot, clash, view, suite or report (see cbvh --help)"
                 .into(),
         );
     }

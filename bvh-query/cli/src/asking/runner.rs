@@ -24,25 +24,26 @@ pub(crate) struct Run<A> {
     jobs: usize,
     /// The seconds from the first question to the last.
     total_seconds: f64,
-    stats: QueryStats,
+    /// The work of all questions; `None` if the asker does not count it.
+    stats: Option<QueryStats>,
 }
 
 /// The results of one thread: answers with their places and nanoseconds.
 struct Share<A> {
     answers: Vec<(usize, (A, u64))>,
-    stats: QueryStats,
+    stats: Option<QueryStats>,
     seconds: f64,
 }
 
 /// Asks about the items whose places `next` returns. `ready` waits until all threads are warm, and `stats` returns the work
-/// of the last question.
+/// of the last question, or `None` if it is not counted.
 fn share<Q, T, A, E>(
     asker: &mut Q,
     items: &[T],
     limits: &RunArguments,
     (ready, next): (impl FnOnce(), impl Fn() -> usize),
     ask: impl Fn(&mut Q, &T) -> Result<A, E>,
-    stats: impl Fn(&mut Q) -> QueryStats,
+    stats: impl Fn(&mut Q) -> Option<QueryStats>,
 ) -> Result<Share<A>, E> {
     let budget = limits.budget.unwrap_or(f64::INFINITY);
     let start = Instant::now();
@@ -54,7 +55,7 @@ fn share<Q, T, A, E>(
         let _ = ask(asker, item);
     }
     let answers = Vec::with_capacity(items.len());
-    let mut share = Share { answers, stats: QueryStats::default(), seconds: 0.0 };
+    let mut share = Share { answers, stats: Some(QueryStats::default()), seconds: 0.0 };
     ready();
     let start = Instant::now();
     loop {
@@ -64,7 +65,7 @@ fn share<Q, T, A, E>(
         let answer = ask(asker, item);
         let nanoseconds = before.elapsed().as_nanos() as u64;
         share.answers.push((index, (answer?, nanoseconds)));
-        add(&mut share.stats, stats(asker));
+        share.stats = sum(share.stats, stats(asker));
         if start.elapsed().as_secs_f64() > budget {
             break;
         }
@@ -74,13 +75,28 @@ fn share<Q, T, A, E>(
 }
 
 impl<A> Run<A> {
-    /// Asks about all items on as many threads as the arguments say.
+    /// Asks two meshes about all items, with a querier on each of as many threads as the arguments say.
     pub(crate) fn new<T: Sync>(
         items: &[T],
         ask: impl Fn(&mut Querier, &T) -> Result<A, QueryError> + Sync,
         backend: Backend,
         limits: &RunArguments,
     ) -> Result<Self, QueryError>
+    where
+        A: Clone + Send,
+    {
+        let askers = (|| Querier::with_backend(backend), |querier: &mut Querier| Some(querier.stats()));
+        Self::shared(items, askers, ask, limits)
+    }
+
+    /// Asks about all items on as many threads as the arguments say. Each thread makes its own asker, and `stats` returns the work
+    /// of the asker's last question, or `None` if it is not counted.
+    pub(crate) fn shared<Q, T: Sync, E: Send>(
+        items: &[T],
+        (asker, stats): (impl Fn() -> Q + Sync, impl Fn(&mut Q) -> Option<QueryStats> + Sync),
+        ask: impl Fn(&mut Q, &T) -> Result<A, E> + Sync,
+        limits: &RunArguments,
+    ) -> Result<Self, E>
     where
         A: Clone + Send,
     {
@@ -91,8 +107,7 @@ impl<A> Run<A> {
                 barrier.wait();
             };
             let next = || place.fetch_add(1, Ordering::Relaxed);
-            let querier = &mut Querier::with_backend(backend);
-            share(querier, items, limits, (ready, next), &ask, |querier| querier.stats())
+            share(&mut asker(), items, limits, (ready, next), &ask, &stats)
         };
         let shares: Vec<_> = std::thread::scope(|scope| {
             let others: Vec<_> = (1..jobs).map(|_| scope.spawn(work)).collect();
@@ -104,11 +119,11 @@ impl<A> Run<A> {
             std::iter::once(own).chain(joined).collect()
         });
         let mut answers = vec![None; items.len()];
-        let mut stats = QueryStats::default();
+        let mut stats = Some(QueryStats::default());
         let mut total_seconds = 0.0f64;
         for share in shares {
             let share = share?;
-            add(&mut stats, share.stats);
+            stats = sum(stats, share.stats);
             total_seconds = total_seconds.max(share.seconds);
             share.answers.into_iter().for_each(|(index, timed)| answers[index] = Some(timed));
         }
@@ -127,7 +142,8 @@ impl<A> Run<A> {
     ) -> Result<Self, E> {
         let place = AtomicUsize::new(0);
         let next = || place.fetch_add(1, Ordering::Relaxed);
-        let Share { answers, stats, seconds } = share(asker, items, limits, (|| (), next), ask, stats)?;
+        let Share { answers, stats, seconds } =
+            share(asker, items, limits, (|| (), next), ask, |asker| Some(stats(asker)))?;
         let answers = answers.into_iter().map(|(_, timed)| timed).collect();
         Ok(Self { answers, requested: items.len(), jobs: limits.jobs.into(), total_seconds: seconds, stats })
     }
@@ -193,13 +209,20 @@ impl<A: Answer> Run<A> {
             peak_rss_mb: process::peak_bytes().map(|bytes| bytes as f64 / 1048576.0),
             isa: backend.name(),
             answers_xxh3: is_complete.then(|| hex(hasher.finish())),
-            node_tests: self.stats.node_tests,
-            triangle_tests: self.stats.packet_tests,
-            exact_tests: self.stats.exact_tests,
+            node_tests: self.stats.map(|of| of.node_tests),
+            triangle_tests: self.stats.map(|of| of.packet_tests),
+            exact_tests: self.stats.map(|of| of.exact_tests),
             jobs: self.jobs,
         }
         .with(A::counts(self.answers()))
     }
+}
+
+/// Returns the sum of what was counted; `None` if some of it was not.
+fn sum(all: Option<QueryStats>, stats: Option<QueryStats>) -> Option<QueryStats> {
+    let mut all = all?;
+    add(&mut all, stats?);
+    Some(all)
 }
 
 /// Adds the work of one query to a sum.

@@ -11,6 +11,7 @@ mod probe;
 mod query;
 mod report;
 mod report_motions;
+mod robot;
 mod rounding;
 mod scene;
 mod suite;
