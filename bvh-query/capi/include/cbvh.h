@@ -877,6 +877,10 @@ cbvh_status cbvh_tracker_within(cbvh_tracker tracker, cbvh_querier querier, cbvh
                                 const cbvh_pose *poses, size_t count, double d, bool *answers);
 cbvh_status cbvh_tracker_distance(cbvh_tracker tracker, cbvh_querier querier, cbvh_mesh a, cbvh_mesh b,
                                   const cbvh_pose *poses, size_t count, cbvh_distance_answer *answers);
+/* As cbvh_signed_distances answers. What is kept from pose to pose serves meshes that are apart. */
+cbvh_status cbvh_tracker_signed_distance(cbvh_tracker tracker, cbvh_querier querier, cbvh_mesh a, cbvh_mesh b,
+                                         const cbvh_pose *poses, size_t count,
+                                         const cbvh_penetration_options *options, cbvh_signed_distance *answers);
 
 /* --------------------------------------------------------------------------------------------------------- motions
  *

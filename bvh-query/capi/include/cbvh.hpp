@@ -1175,6 +1175,22 @@ public:
             return cbvh_tracker_distance(raw(), querier.raw(), a.raw(), b.raw(), poses.data(), poses.size(), answers);
         });
     }
+    SignedDistance signed_distance(Querier &querier, const Mesh &a, const Mesh &b, const Pose &pose,
+                                   const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        SignedDistance answer{};
+        check(cbvh_tracker_signed_distance(raw(), querier.raw(), a.raw(), b.raw(), &pose, 1, &raw_options, &answer));
+        return answer;
+    }
+    std::vector<SignedDistance> signed_distance(Querier &querier, const Mesh &a, const Mesh &b,
+                                                const std::vector<Pose> &poses,
+                                                const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        return detail::answers<SignedDistance>(poses.size(), [&](SignedDistance *answers) {
+            return cbvh_tracker_signed_distance(raw(), querier.raw(), a.raw(), b.raw(), poses.data(), poses.size(),
+                                                &raw_options, answers);
+        });
+    }
 
 private:
     using Owned = detail::Handle<cbvh_tracker, cbvh_tracker_free>;

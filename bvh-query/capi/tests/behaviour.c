@@ -944,6 +944,14 @@ static void trackers(void) {
     OK(cbvh_distances(querier, mesh, mesh, poses, STEPS, NULL, one));
     OK(cbvh_tracker_distance(tracker, querier, mesh, mesh, poses, STEPS, other));
     CHECK(memcmp(one, other, sizeof one) == 0);
+    static cbvh_signed_distance signed_one[STEPS], signed_other[STEPS];
+    OK(cbvh_signed_distances(querier, mesh, mesh, poses, STEPS, NULL, signed_one));
+    OK(cbvh_tracker_signed_distance(tracker, querier, mesh, mesh, poses, STEPS, NULL, signed_other));
+    CHECK(memcmp(signed_one, signed_other, sizeof signed_one) == 0);
+    CHECK(signed_one[0].lower > 0.9 && signed_one[STEPS - 1].upper < -0.5);
+    const cbvh_penetration_options wrong = {.size = sizeof wrong, .relative_gap = -1};
+    FAILS(cbvh_tracker_signed_distance(tracker, querier, mesh, mesh, poses, STEPS, &wrong, signed_other),
+          CBVH_INVALID_ARGUMENT, "relative_gap: ");
     OK(cbvh_tracker_free(tracker));
     FAILS(cbvh_tracker_free(tracker), CBVH_INVALID_HANDLE, "tracker: ");
     /* With an allowed error, the answer is between the bounds that it states. */

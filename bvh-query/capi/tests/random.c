@@ -188,7 +188,8 @@ int main(int argument_count, char **arguments) {
         case 6: status = cbvh_displacement(a, in, more, out); break;
         case 7: status = cbvh_tracker_collide(r, q, a, b, in, n, out); break;
         case 8: status = cbvh_tracker_within(r, q, a, b, in, n, x, out); break;
-        case 9: status = cbvh_tracker_distance(r, q, a, b, in, n, out); break;
+        case 9: status = below(2) ? cbvh_tracker_distance(r, q, a, b, in, n, out)
+                                : cbvh_tracker_signed_distance(r, q, a, b, in, n, options, out); break;
         case 10: status = cbvh_motions(q, a, b, paths, below(3), options, out); break;
         case 11: status = cbvh_are_free(q, a, b, paths, below(3), options, out); break;
         case 12: status = cbvh_edge_motions(q, a, b, in, more, n, options, out); break;

@@ -170,6 +170,8 @@ void answers(bool parallel) {
     CHECK(tracker.collide(querier, one, one, poses) == querier.collide(one, one, poses));
     CHECK(tracker.within(querier, one, one, poses, 0.4) == querier.within(one, one, poses, 0.4));
     CHECK(tracker.distance(querier, one, one, poses)[2].distance == 0.5);
+    CHECK(tracker.signed_distance(querier, one, one, poses)[2].lower == querier.signed_distance(one, one, poses)[2].lower);
+    CHECK(tracker.signed_distance(querier, one, one, poses[0]).upper == querier.signed_distance(one, one, poses[0]).upper);
     const std::vector<cbvh::Pose> fewer{poses[0]};
     FAILS(querier.edges_are_free(one, one, poses, fewer), CBVH_INVALID_ARGUMENT, "as many ends as starts");
     FAILS(querier.within(one, one, poses, -1), CBVH_INVALID_ARGUMENT, "d: ");

@@ -32,9 +32,9 @@ pub(crate) struct EdgeCrossing {
     pub(crate) error: f64,
 }
 
-/// Returns the ends of the segment that two triangles have in common, from which it leads along the cross product of A's normal and
-/// B's to which; nothing if the moved triangles have nothing in common. If one triangle has no area, both ends are edges of it that
-/// pass through the other one in the same place.
+/// Returns the start and the end of the segment that two triangles have in common; nothing if the moved triangles have nothing in
+/// common. The segment has the direction of the cross product of A's normal and B's. Where an edge of a triangle without area passes
+/// through the other triangle, another edge of it does so in the same place: start and end are one point.
 pub(crate) fn edge_crossings(a: &Triangle, b: &Triangle) -> Option<[EdgeCrossing; 2]> {
     let (fronts_a, fronts_b) = (fronts(b, a, 1.0), fronts(a, b, -1.0));
     let is_apart = |fronts: Option<[bool; 3]>| fronts == Some([true; 3]) || fronts == Some([false; 3]);
@@ -70,8 +70,8 @@ fn fronts(plane: &Triangle, points: &Triangle, sign: f64) -> Option<[bool; 3]> {
     Some(heights.map(|height| height > 0.0 || (height == 0.0 && beside > 0.0)))
 }
 
-/// Returns a number with the sign of the height over the plane of a triangle to which points in it rise that move along the first of
-/// the ordered axes, and less along the next; nothing if the triangle has no area.
+/// Returns a number with the sign of the height that a point of a triangle gains over its plane when it moves along the first of the
+/// ordered axes, by much less along the second, and by much less again along the third; nothing if the triangle has no area.
 pub(super) fn moved_height([p, q, r]: &Triangle) -> Option<f64> {
     ORDER.into_iter().map(|axis| area(axis, *p, *q, *r)).find(|component| *component != 0.0)
 }

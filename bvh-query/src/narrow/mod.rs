@@ -69,7 +69,7 @@ fn negated(p: Point) -> Point {
 
 /// Returns the index of the largest number; of equal ones, the first.
 #[inline(always)]
-fn largest_of([p, q, r]: [f64; 3]) -> usize {
+pub(crate) fn largest_of([p, q, r]: [f64; 3]) -> usize {
     if p >= q && p >= r {
         0
     } else if q >= r {

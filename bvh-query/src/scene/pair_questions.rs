@@ -197,7 +197,7 @@ impl Scene {
             near_pairs.retain(|near_pair| is_asked(scene.ids(near_pair.a, near_pair.b)));
             all.extend(scene.each(&near_pairs, |querier, pair| {
                 let (world, at) = (pair.world.rotation(), pair.world.translation());
-                let mut clash = querier.clash_along(pair.a, pair.b, &pair.pose, options, *world)?;
+                let mut clash = querier.clash_along(pair.a, pair.b, &pair.pose, options, world)?;
                 for corner in
                     clash.magnitudes.iter_mut().filter_map(|shared| shared.bounds.as_mut()).flatten()
                 {

@@ -9,7 +9,7 @@ use crate::query::depth::penetration::Penetration;
 use crate::query::displacement::{displacement, size};
 use crate::query::distance::Distance;
 use crate::query::exact::{placed, stored_at};
-use crate::query::intersection::{AXES, Intersection};
+use crate::query::intersection::Intersection;
 use crate::query::options::{check, options};
 use crate::query::probe::closest::IsWithin;
 use crate::query::probe::placed::PlacedShape;
@@ -153,17 +153,17 @@ impl Querier {
         pose: &Pose,
         options: &ClashOptions,
     ) -> Result<Clash, QueryError> {
-        self.clash_along(a.into(), b.into(), pose, options, AXES)
+        self.clash_along(a.into(), b.into(), pose, options, Pose::IDENTITY.rotation())
     }
 
-    /// Returns how two parts lie, with a box of what they have in common along some directions.
+    /// Returns how two parts lie, with the box of what they have in common along other axes than those of A's frame.
     pub(crate) fn clash_along(
         &mut self,
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
         options: &ClashOptions,
-        axes: [[f64; 3]; 3],
+        axes: &[[f64; 3]; 3],
     ) -> Result<Clash, QueryError> {
         options.check()?;
         self.start();

@@ -2,7 +2,7 @@
 //! between them.
 
 use crate::error::QueryError;
-use crate::narrow::{EdgeCrossing, Point, edge_crossings};
+use crate::narrow::{EdgeCrossing, Point, edge_crossings, largest_of};
 use crate::query::intersection::surface::Surface;
 
 /// A vertex of either surface, or a point where an edge passes through a face.
@@ -195,7 +195,7 @@ impl Found {
         let [first, last] = [from.min(to), from.max(to)];
         let [p, q] = [first, last].map(|vertex| own.points[vertex as usize]);
         let along = [0, 1, 2].map(|axis| (q[axis] - p[axis]).abs());
-        let axis = (1..3).fold(0, |best, axis| if along[axis] > along[best] { axis } else { best });
+        let axis = largest_of(along);
         let net = i64::from(other.faces[faces[1 - side] as usize].net);
         let rise = if crossing.enters == (from < to) { net } else { -net };
         let at = (crossing.point[axis] - p[axis]).abs();

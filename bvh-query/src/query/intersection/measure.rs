@@ -71,8 +71,8 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    pub(super) fn new(middle: Point, axes: [Point; 3]) -> Self {
-        Self { middle, axes, volume: Sum::default(), areas: [0.0; 2], bounds: None }
+    pub(super) fn new(middle: Point, axes: &[Point; 3]) -> Self {
+        Self { middle, axes: *axes, volume: Sum::default(), areas: [0.0; 2], bounds: None }
     }
 
     /// Adds the parts of a face of one of the surfaces, given the lines around them.

@@ -36,9 +36,6 @@ use crate::query::querier::Querier;
 use crate::traverse::walk::Order;
 use std::ops::ControlFlow;
 
-/// The axes of a frame.
-pub(crate) const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
 /// What two shapes have in common, in mesh units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -95,7 +92,8 @@ impl Querier {
     /// inside A are connected, and B is not pierced. If A cuts across a corner without its edge, the distance is that of the
     /// two sides there. Two plates that cross may pierce each other.
     ///
-    /// **Flush faces.** The answer is that for a B moved by less than any number, towards less y, then less z, then less x. So a common
+    /// **Flush faces.** The answer is that for a B moved by less than any number, down the y-axis, by much less down the z-axis, and by
+    /// much less again down the x-axis. So a common
     /// face encloses nothing. Of two solids on one side of it, it belongs to the surface of either A or B. Of solids on both sides, it
     /// belongs to both surfaces if the move is towards A, and then is in the box; else to neither. Whether parts meet along it follows
     /// from that move, too.
@@ -115,16 +113,16 @@ impl Querier {
         pose: &Pose,
     ) -> Result<Intersection, QueryError> {
         self.start();
-        self.intersection_along(a.into(), b.into(), pose, AXES)
+        self.intersection_along(a.into(), b.into(), pose, Pose::IDENTITY.rotation())
     }
 
-    /// Returns the intersection, with a box along some directions.
+    /// Returns the intersection, with its box along other axes than those of A's frame.
     pub(crate) fn intersection_along(
         &mut self,
         a: Shape<'_>,
         b: Shape<'_>,
         pose: &Pose,
-        axes: [[f64; 3]; 3],
+        axes: &[[f64; 3]; 3],
     ) -> Result<Intersection, QueryError> {
         let Common { surfaces, cuts, windings } = self.common(a, b, pose)?;
         let middle = cuts.middle().unwrap_or_else(|| {
@@ -149,7 +147,7 @@ impl Querier {
 
     /// Returns the boundary of what two closed meshes have in common, as polygons, for those who draw it: the parts of A's faces inside B,
     /// and then those of B's faces inside A. See [`Querier::intersection`]. Its points are rounded; parts that are next to each other have
-    /// the same points, so that no gap is between them.
+    /// the same points, so that there is no gap between them.
     ///
     /// # Errors
     /// The errors of [`Querier::intersection`].

@@ -7,7 +7,7 @@
 //! Parts meet where they have a node in common. Within one face they also do if one of them is a hole in the other.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, Triangle, dot, subtract, triangle_distance};
+use crate::narrow::{Point, Triangle, dot, largest_of, subtract, triangle_distance};
 use crate::query::intersection::cuts::{Arc, Cuts, Node};
 use crate::query::intersection::polygons::{COMPARISONS, goes_around, polygons, steepest_axis};
 use crate::query::intersection::surface::Surface;
@@ -290,8 +290,7 @@ fn build(pieces: &mut [Piece], node: usize, nodes: &mut Vec<([Point; 2], Option<
     if pieces.len() <= FEW {
         return;
     }
-    let along = subtract(hi, lo);
-    let axis = (1..3).fold(0, |best, k| if along[k] > along[best] { k } else { best });
+    let axis = largest_of(subtract(hi, lo));
     let middle = pieces.len() / 2;
     let place = |piece: &Piece| piece.lo[axis] + piece.hi[axis];
     pieces.select_nth_unstable_by(middle, |x, y| place(x).total_cmp(&place(y)));

@@ -1,7 +1,7 @@
 //! The parts of a face as polygons: closed ways along the lines around them, and which of these are holes in which.
 
 use crate::error::QueryError;
-use crate::narrow::{Point, Triangle, cross, subtract};
+use crate::narrow::{Point, Triangle, cross, largest_of, subtract};
 use crate::query::intersection::cuts::{Arc, Node};
 use crate::traverse::budget::Budget;
 use std::collections::BTreeMap;
@@ -72,7 +72,7 @@ pub(super) fn polygons(
 /// components near 0 that tell nothing.
 pub(super) fn steepest_axis([p, q, r]: &Triangle) -> usize {
     let normal: Point = cross(subtract(*q, *p), subtract(*r, *p));
-    (1..3).fold(0, |best, axis| if normal[axis].abs() > normal[best].abs() { axis } else { best })
+    largest_of(normal.map(f64::abs))
 }
 
 /// Returns whether lines in a plane go around a point.

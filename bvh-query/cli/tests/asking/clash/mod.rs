@@ -1,11 +1,13 @@
 //! Tests `cbvh clash`: classes, depths and places of small assemblies, however they are given, and what is written about them.
 
-use crate::common::{Files as _, Place, backends, cbvh_in, cbvh_with_isa, names, place};
-use crate::documents::{elements, rows_of};
+mod bcf;
+mod magnitudes;
+
+use crate::common::{Files as _, Place, backends, cbvh_in, cbvh_with_isa, place};
+use crate::documents::rows_of;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 
 /// Returns a box with faces that look outwards, without the last one if it is open.
 fn block(lo: [f64; 3], hi: [f64; 3], is_open: bool) -> String {
@@ -156,68 +158,6 @@ fn each_class_is_found_in_a_folder() {
     }
     directory.cbvh("clash parts/flush.obj parts/sub/near.obj --csv none.csv --json").done();
     assert_eq!(directory.text("none.csv").lines().count(), 1);
-}
-
-/// A duct through the plate, and all others, with what they have in common.
-#[test]
-fn magnitudes_are_those_of_boxes() {
-    let directory = &parts();
-    directory.write("parts/duct.obj", block([7.0, 7.0, -1.0], [8.0, 7.5, 3.0], false));
-    let plain = directory.cbvh("clash parts --json").done();
-    directory.write("plain.json", plain.out.as_bytes());
-    assert!(find(&plain.json(), "duct", "plate").get("volume").is_none());
-    let answer = directory
-        .cbvh("clash parts --magnitudes --json --csv c.csv --bcf c.bcfzip --baseline plain.json")
-        .done()
-        .json();
-    // Dividing a class is no change.
-    assert_eq!(answer["statuses"], json!({"new": 0, "changed": 0, "same": 6, "gone": 0}));
-    assert_eq!((&answer["classes"]["piercing"], &answer["classes"]["overlapping"]), (&json!(1), &json!(0)));
-    let near = |value: &Value, expected: f64| (value.as_f64().unwrap() - expected).abs() <= 1e-12 * expected;
-    for (a, b, class, volume, pierced, lo, hi) in [
-        ("duct", "plate", "piercing", 0.5, json!([null, 1.0]), [7.0, 7.0, 0.0], [8.0, 7.5, 1.0]),
-        ("deep", "plate", "protruding", 0.25, json!([null, null]), [2.0, 2.0, 0.75], [3.0, 3.0, 1.0]),
-        ("inner", "plate", "contained", 0.125, json!([null, null]), [4.0, 4.0, 0.25], [4.5, 4.5, 0.75]),
-        ("plate", "twin", "duplicated", 100.0, json!([null, null]), [0.0; 3], [10.0, 10.0, 1.0]),
-    ] {
-        let clash = find(&answer, a, b);
-        assert_eq!(
-            (&clash["class"], &clash["pierced"], &clash["reason"]),
-            (&json!(class), &pierced, &Value::Null),
-            "{clash}"
-        );
-        assert!(near(&clash["volume"], volume) && clash["volume_error"].as_f64().unwrap() < 1e-10, "{clash}");
-        assert!(close(&clash["box"][0], lo) && close(&clash["box"][1], hi), "{clash}");
-    }
-    let open = find(&answer, "open", "plate");
-    assert_eq!(
-        (&open["volume"], &open["box"], &open["reason"]),
-        (&Value::Null, &Value::Null, &json!("a is not closed"))
-    );
-    assert!(find(&answer, "flush", "plate").get("volume").is_none());
-    let rows = rows_of(&directory.text("c.csv"));
-    let duct = rows.iter().find(|row| row["a"] == "duct").unwrap();
-    assert_eq!((&*duct["pierced_a"], &*duct["pierced_b"], &*duct["high_y"]), ("", "1.0", "7.5"));
-    let topics = unzip(&std::fs::read(directory.join("c.bcfzip")).unwrap());
-    assert!(topics.values().any(|text| text.contains("piercing: duct | plate")
-        && text.contains("volume 0.5, 1 of the second pierced")));
-
-    let listed = |arguments: &str| -> Vec<String> {
-        let answer = directory.cbvh(&format!("clash parts --json {arguments}")).done().json();
-        let names = answer["clashes"].as_array().unwrap().iter();
-        names.map(|clash| clash["a"].as_str().unwrap().to_owned()).collect()
-    };
-    assert_eq!(listed("--sort volume"), ["plate", "duct", "deep", "inner", "open", "flush"]);
-    assert_eq!(listed("--min-volume 0.25"), ["duct", "deep", "open", "plate"]);
-    let text = directory.cbvh("clash parts --magnitudes").done().out;
-    assert!(
-        text.contains("volume 0.5, 1 of the second pierced") && text.contains("a is not closed"),
-        "{text}"
-    );
-    let ended = directory.cbvh("clash parts --magnitudes --fail-on overlapping");
-    ended.failed(5, &["found 2; the first: duct | plate"]);
-    directory.cbvh("clash parts --min-volume -1").failed(1, &["--min-volume", "-1"]);
-    directory.cbvh("clash parts --sort depth").failed(1, &["--sort", "depth", "volume"]);
 }
 
 #[test]
@@ -507,107 +447,6 @@ fn shards_together_are_the_whole() {
             "{clash}"
         );
     }
-}
-
-/// Returns the files of an archive whose entries are stored as they are.
-fn unzip(bytes: &[u8]) -> BTreeMap<String, String> {
-    let number = |at: usize, length: usize| {
-        bytes[at..at + length].iter().rev().fold(0, |sum, &byte| sum << 8 | usize::from(byte))
-    };
-    let end = bytes.len() - 22;
-    assert_eq!(&bytes[end..end + 4], b"PK\x05\x06");
-    let (mut at, mut files) = (number(end + 16, 4), BTreeMap::new());
-    for _ in 0..number(end + 10, 2) {
-        assert_eq!(&bytes[at..at + 4], b"PK\x01\x02");
-        assert_eq!((number(at + 10, 2), number(at + 20, 4)), (0, number(at + 24, 4)), "stored");
-        let (length, name_length, local) = (number(at + 20, 4), number(at + 28, 2), number(at + 42, 4));
-        let name = &bytes[at + 46..at + 46 + name_length];
-        assert_eq!(&bytes[local..local + 4], b"PK\x03\x04");
-        assert_eq!(bytes[local + 14..local + 26], bytes[at + 16..at + 28], "both headers agree");
-        assert_eq!(&bytes[local + 30..local + 30 + name_length], name);
-        let content = &bytes[local + 30 + name_length..][..length];
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-        assert!(files.insert(text(name), text(content)).is_none());
-        at += 46 + name_length;
-    }
-    assert_eq!(at, end);
-    files
-}
-
-#[test]
-fn topics_of_bcf_can_be_read_back() {
-    let directory = &parts();
-    std::fs::rename(directory.join("parts/deep.obj"), directory.join("parts/2O2Fr$t4X7Zf8NOew3FLOH.obj"))
-        .unwrap();
-    directory.write("parts/a & b.obj", block([0.0, 0.0, 0.5], [1.0; 3], false));
-    let write = |name: &str, epoch: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_cbvh"));
-        command
-            .args(["clash", "parts", "--json", "--bcf", name])
-            .current_dir(directory)
-            .env("SOURCE_DATE_EPOCH", epoch);
-        command.output().unwrap()
-    };
-    let answer: Value = serde_json::from_slice(&write("a.bcfzip", "951782400").stdout).unwrap();
-    write("b.bcfzip", "951782400");
-    let bytes = std::fs::read(directory.join("a.bcfzip")).unwrap();
-    assert_eq!(bytes, std::fs::read(directory.join("b.bcfzip")).unwrap());
-    let files = unzip(&bytes);
-    let clashes = answer["clashes"].as_array().unwrap();
-    assert_eq!(files.len(), 1 + 3 * clashes.len());
-    let parsed =
-        |text: &str| elements(text.strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n").unwrap());
-    assert_eq!(parsed(&files["bcf.version"])[0].1["VersionId"], "2.1");
-    let mut indices = Vec::new();
-    for (name, text) in files.iter().filter(|(name, _)| name.ends_with("/markup.bcf")) {
-        let folder = name.strip_suffix("/markup.bcf").unwrap();
-        assert_eq!(files[&format!("{folder}/")], "", "an entry of the folder");
-        let markup = parsed(text);
-        let order: Vec<&str> = markup.iter().map(|(name, _)| &**name).collect();
-        let fields =
-            ["Markup", "Topic", "Title", "Priority", "Index", "Labels", "CreationDate", "CreationAuthor"];
-        assert_eq!(order, [&fields[..], &["Description", "Viewpoints", "Viewpoint"]].concat());
-        assert_eq!(markup[1].1["Guid"], folder);
-        assert!(text.contains("<CreationDate>2000-02-29T00:00:00Z</CreationDate>"));
-        let inner = |tag: &str| text.split(&format!("<{tag}>")).nth(1).unwrap().split('<').next().unwrap();
-        let index: usize = inner("Index").parse().unwrap();
-        assert!(inner("Title").starts_with(clashes[index]["class"].as_str().unwrap()));
-        assert!(
-            inner("Description").ends_with(&format!("Clash {}.", clashes[index]["id"].as_str().unwrap()))
-        );
-        indices.push(index);
-        let view = &files[&format!("{folder}/viewpoint.bcfv")];
-        let viewpoint = parsed(view);
-        assert_eq!(viewpoint[0].1["Guid"], markup[9].1["Guid"]);
-        assert_eq!(viewpoint.iter().filter(|(name, _)| name == "Component").count(), 2);
-        let has_guid = viewpoint.iter().any(|(_, attributes)| attributes.contains_key("IfcGuid"));
-        let named = ["a", "b"].map(|field| clashes[index][field].as_str().unwrap());
-        assert_eq!(has_guid, named.contains(&"2O2Fr$t4X7Zf8NOew3FLOH"));
-        assert!(
-            named
-                .iter()
-                .all(|name| view.contains(&format!(">{}</AuthoringToolId>", name.replace('&', "&amp;"))))
-        );
-        let camera: Vec<f64> = ["<X>", "<Y>", "<Z>"]
-            .iter()
-            .flat_map(|tag| view.split(tag).skip(1))
-            .map(|text| text.split('<').next().unwrap().parse().unwrap())
-            .collect();
-        // The camera looks at the clash: the position and a multiple of the direction lead there.
-        let [from, towards, up] = [0, 1, 2].map(|which| [0, 3, 6].map(|axis| camera[axis + which]));
-        let point = [0, 1, 2].map(|k| clashes[index]["point"][k].as_f64().unwrap());
-        let away = (0..3).map(|k| (point[k] - from[k]) * towards[k]).sum::<f64>();
-        assert!(away > 0.0 && (0..3).all(|k| (from[k] + away * towards[k] - point[k]).abs() < 1e-9));
-        assert!((0..3).map(|k| up[k] * towards[k]).sum::<f64>().abs() < 1e-9);
-    }
-    indices.sort_unstable();
-    assert_eq!(indices, (0..clashes.len()).collect::<Vec<_>>());
-    assert!(
-        String::from_utf8(write("c.bcfzip", "soon").stderr)
-            .unwrap()
-            .starts_with("cbvh: SOURCE_DATE_EPOCH: expected")
-    );
-    assert_eq!(names(directory), ["a.bcfzip", "b.bcfzip", "parts"]);
 }
 
 /// Damaged pages of a part are told with its file, and only if they are needed.
