@@ -12,6 +12,7 @@
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
 
 mod asker;
+mod capsules;
 mod edge;
 mod error;
 mod frame;

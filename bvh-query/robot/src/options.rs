@@ -40,7 +40,9 @@ pub struct RobotOptions {
     /// Gazebo and Pinocchio ignore the axis, and robots are modelled so that they look right there. The unit of lengths that a
     /// mesh declares is always applied.
     pub up_axis: UpAxis,
-    /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000.
+    /// A cylinder is a prism around it that is this part of the radius wider at most. The default is 1/1000. A cylinder with spheres of
+    /// its radius at both ends is a capsule, without any prism, even if they are off by a thousandth, as rounded angles make them. It
+    /// contains all three, and is wider by that at most: a thousandth of the sum of its radius and half of its length.
     pub cylinder_error: f64,
     /// A folder for baked meshes, under names that follow from what was read, so that they are baked once.
     pub cache: Option<PathBuf>,

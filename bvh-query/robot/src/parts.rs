@@ -21,7 +21,8 @@ pub struct RobotParts {
     pub base: Base,
     /// What the readers of meshes warned of, which is in [`Robot::warnings`].
     pub mesh_warnings: Vec<String>,
-    /// The shapes of all links without margins, in the order of the links, and of a link in that of the file.
+    /// The shapes of all links without margins, in the order of the links, and of a link in that of the file. A capsule that the file
+    /// spells as a cylinder and two spheres is one shape, in the place of the cylinder.
     pub links: Vec<OwnedShape>,
     /// Obstacles and attached objects, in the order in which they were added.
     pub others: Vec<OtherBody>,

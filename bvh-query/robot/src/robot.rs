@@ -1,6 +1,7 @@
 //! A robot: reads it, and changes what stands around it and which pairs are asked about.
 
 use crate::asker::Asker;
+use crate::capsules::join;
 use crate::error::RobotError;
 use crate::frame::Frame;
 use crate::model::{Link, Model};
@@ -118,6 +119,7 @@ impl Robot {
         let bodies = model.links.iter().map(body).collect();
         // In the order of the links, so that answers are.
         elements.sort_by_key(|element| element.link);
+        join(&mut elements);
         let mut parts = Vec::new();
         let (shapes, of_meshes) = shapes(&model, &elements)?;
         for (element, shape) in elements.iter().zip(shapes) {
