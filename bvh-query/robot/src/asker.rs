@@ -114,13 +114,18 @@ impl Asker {
         Ok(false)
     }
 
-    /// Returns the pairs that touch, by their numbers.
+    /// Returns pairs that touch, by their numbers: of each two bodies, the first pair that does.
     pub(crate) fn touching(&mut self, setting: &Setting, joints: &[f64]) -> Result<Vec<usize>, RobotError> {
         self.place(setting, joints)?;
-        let mut touching = Vec::new();
-        for number in 0..setting.pairs.len() {
-            if self.touches(setting, number)? {
-                touching.push(number);
+        let (mut touching, mut number) = (Vec::new(), 0);
+        while let Some(pair) = setting.pairs.get(number) {
+            number += 1;
+            if self.touches(setting, number - 1)? {
+                touching.push(number - 1);
+                // The others of these bodies do not matter, and come next.
+                let bodies = setting.bodies_of(pair);
+                let others = setting.pairs[number..].iter();
+                number += others.take_while(|other| setting.bodies_of(other) == bodies).count();
             }
         }
         Ok(touching)

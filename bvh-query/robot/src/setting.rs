@@ -121,21 +121,36 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
-    /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch.
+    /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch. Pairs of
+    /// the same bodies follow each other.
     pub(crate) fn list_pairs(&mut self, allowed: &HashSet<[usize; 2]>) {
         let mut pairs = Vec::new();
-        for (a, one) in self.parts.iter().enumerate() {
-            for (b, other) in self.parts.iter().enumerate().skip(a + 1) {
-                // An obstacle is asked about with all links, also with those that never move.
-                let is_rigid = one.group == other.group && one.is_still == other.is_still;
-                if is_rigid || allowed.contains(&[one.body, other.body]) {
-                    continue;
+        let mut rest = self.parts.as_slice();
+        let mut first = 0;
+        while let Some(body) = rest.first().map(|part| part.body) {
+            let (own, others) = rest.split_at(rest.partition_point(|part| part.body == body));
+            let mut start = first + own.len();
+            for of_other in others.chunk_by(|one, other| one.body == other.body) {
+                if !allowed.contains(&[body, of_other[0].body]) {
+                    for (a, one) in (first..).zip(own) {
+                        for (b, other) in (start..).zip(of_other) {
+                            // An obstacle is asked about with all links, also with those that never move.
+                            if one.group != other.group || one.is_still != other.is_still {
+                                pairs.push(Pair { a, b, reach: (one.radius + other.radius) * ROUNDED_UP });
+                            }
+                        }
+                    }
                 }
-                let reach = (one.radius + other.radius) * ROUNDED_UP;
-                pairs.push(Pair { a, b, reach });
+                start += of_other.len();
             }
+            (rest, first) = (others, first + own.len());
         }
         self.pairs = pairs;
+    }
+
+    /// Returns the bodies of a pair.
+    pub(crate) fn bodies_of(&self, pair: &Pair) -> [usize; 2] {
+        [pair.a, pair.b].map(|part| self.parts[part].body)
     }
 
     /// Returns the names of the bodies of two parts.

@@ -324,3 +324,32 @@ fn answers_do_not_depend_on_the_backend() {
         assert_eq!(robot.motion(&edge, &options).unwrap(), other.motion(&edge, &options).unwrap());
     }
 }
+
+/// Of bodies of several shapes, those that touch come in the order of all pairs as well, each once.
+#[test]
+fn pairs_in_contact_are_in_the_order_of_pairs() {
+    let link = |name: &str, places: &[f64]| {
+        let shape = "<geometry><sphere radius=\"0.4\"/></geometry>";
+        let element = |x: &f64| format!("<collision><origin xyz=\"{x} 0 0\"/>{shape}</collision>");
+        let elements: String = places.iter().map(element).collect();
+        format!("<link name=\"{name}\">{elements}</link>")
+    };
+    let joint = |name: &str| {
+        format!(
+            "<joint name=\"to {name}\" type=\"prismatic\"><parent link=\"a\"/><child link=\"{name}\"/>\
+             <axis xyz=\"0 1 0\"/></joint>"
+        )
+    };
+    let links =
+        [link("a", &[0.0, 2.0]), link("b", &[2.0, 2.1]), link("c", &[0.1, 2.2]), joint("b"), joint("c")];
+    let folder = cbvh_testkit::folder();
+    let path = folder.path().join("robot.urdf");
+    std::fs::write(&path, format!("<robot name=\"one\">{}</robot>", links.concat())).unwrap();
+    let mut robot = Robot::from_urdf(path, &RobotOptions::default()).unwrap();
+    let all = [["a", "b"], ["a", "c"], ["b", "c"]].map(|pair| pair.map(str::to_owned));
+    assert_eq!(robot.pairs(), all);
+    // The first sphere of A touches C alone, and the second one B and C.
+    assert_eq!(robot.pairs_in_contact(&[0.0, 0.0]).unwrap(), all);
+    assert_eq!(robot.pairs_in_contact(&[0.0, 1.0]).unwrap(), all[..1]);
+    assert_eq!(robot.pairs_in_contact(&[1.0, 0.0]).unwrap(), all[1..2]);
+}
