@@ -2,6 +2,7 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
+use crate::rod::are_within;
 use crate::setting::{Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
 
@@ -82,13 +83,24 @@ impl Asker {
 
     #[inline(never)]
     fn shapes_touch(&mut self, setting: &Setting, pair: &Pair) -> Result<bool, RobotError> {
-        let relative = self.relative(setting, pair);
+        if let Some(touches) = self.rods_are_within(setting, pair, 0.0) {
+            return Ok(touches);
+        }
         let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part]);
+        let relative = self.relative(setting, pair);
         if boxes_apart(&relative, a, b, self.slack) {
             return Ok(false);
         }
         let pose = relative.pose()?;
         self.querier.collide(&a.shape, &b.shape, &pose).map_err(|source| failed(setting, pair, source))
+    }
+
+    /// Returns whether a pair is within a distance, 0 for contact, or `None` if its rods do not tell.
+    #[inline(always)]
+    pub(crate) fn rods_are_within(&self, setting: &Setting, pair: &Pair, distance: f64) -> Option<bool> {
+        let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part]);
+        let groups = [a, b].map(|part| &self.groups[part.group]);
+        are_within(a.rods.as_ref()?, b.rods.as_ref()?, groups, distance, self.slack)
     }
 
     /// Returns how far apart a pair is.
@@ -190,9 +202,14 @@ impl Asker {
             }
             let pair = &setting.pairs[number];
             let failed = |source| failed(setting, pair, source);
+            let by_rods =
+                if limit.is_finite() { self.rods_are_within(setting, pair, limit) } else { Some(true) };
+            if by_rods == Some(false) {
+                continue;
+            }
             let pose = self.relative(setting, pair).pose()?;
             let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part].shape);
-            if limit.is_finite() && !self.querier.within(a, b, &pose, limit).map_err(failed)? {
+            if by_rods.is_none() && !self.querier.within(a, b, &pose, limit).map_err(failed)? {
                 continue;
             }
             let distance = self.querier.distance(a, b, &pose).map_err(failed)?;

@@ -4,7 +4,7 @@
 //! URDF (urdf) ──> kinematic tree (model) ─┐
 //!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
-//!                                                  ├──> questions about configurations (questions, asker)
+//!                                                  ├──> questions about configurations (questions, asker, rod)
 //!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns)
 //!                                                  └──> plain data, and back (parts)
 //! ```
@@ -25,6 +25,8 @@ mod pair_path;
 mod parts;
 mod questions;
 mod robot;
+mod rod;
+mod rod_of;
 mod schema;
 mod setting;
 mod shapes;

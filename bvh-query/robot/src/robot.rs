@@ -316,7 +316,7 @@ impl Robot {
         for part in setting.parts.iter_mut().filter(|part| part.body == body) {
             let origin =
                 link.map_or(Frame::IDENTITY, |link| setting.model.links[link].origin).of(&pose.into());
-            (part.origin, part.centre) = (origin, origin.place(part.middle));
+            part.place(origin);
         }
         Ok(())
     }

@@ -3,6 +3,8 @@
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
 use crate::model::Model;
+use crate::rod::Rods;
+use crate::rod_of::rods_of;
 use bvh_query::{OwnedShape, Pose, Shape};
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -40,6 +42,8 @@ pub(crate) struct Part {
     /// The middle of the box around it, in its own frame, and half of the box's sides.
     pub(crate) middle_of_box: Point,
     pub(crate) half: Point,
+    /// Of a ball, a capsule or a cylinder.
+    pub(crate) rods: Option<Rods>,
 }
 
 impl Part {
@@ -54,6 +58,7 @@ impl Part {
         let (middle_of_box, half) = bounds(shape.shape());
         let (middle, radius) = ball(shape.shape());
         let centre = origin.place(middle);
+        let rods = rods_of(shape.shape(), &origin);
         Ok(Self {
             body,
             group,
@@ -67,7 +72,16 @@ impl Part {
             radius,
             middle_of_box,
             half,
+            rods,
         })
+    }
+
+    /// Moves it to another place in its group.
+    pub(crate) fn place(&mut self, origin: Frame) {
+        (self.origin, self.centre) = (origin, origin.place(self.middle));
+        if let Some(rods) = &mut self.rods {
+            rods.place(&origin);
+        }
     }
 }
 
