@@ -301,7 +301,9 @@ fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
     let way = each(|k| middle[k] - a.middle_of_box[k]);
     let (turn, half_a, half_b) = (&b_in_a.rotation, &a.half, &b.half);
     let size = half_a.iter().chain(half_b).chain(&a.middle_of_box).chain(&b.middle_of_box);
-    let slack = slack + ROUNDING * size.map(|x| x.abs()).sum::<f64>();
+    // Columns of a rotation that is not rigid are not quite unit vectors, nor across each other.
+    let off = ROUNDING + a.departure + b.departure;
+    let slack = slack + off * size.map(|x| x.abs()).sum::<f64>();
     let steep = each(|i| each(|j| turn[i][j].abs() + ROUNDING));
     let on_a =
         |i: usize| way[i].abs() > half_a[i] + (0..3).map(|j| steep[i][j] * half_b[j]).sum::<f64>() + slack;

@@ -100,3 +100,15 @@ pub(crate) fn each<T>(of: impl Fn(usize) -> T) -> [T; 3] {
 pub(crate) fn length(v: Point) -> f64 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
+
+/// Returns more than how far a rotation is from a rigid one, as a part of lengths: twice the sum of the entries of R^T R - I.
+///
+/// Frames of joints are rigid but for roundings. A pose that a caller gives may be 2^-20 from rigid, as those that were computed in
+/// `f32` are.
+pub(crate) fn departure(rotation: &Matrix) -> f64 {
+    let entry = |i: usize, j: usize| {
+        let product: f64 = (0..3).map(|row| rotation[row][i] * rotation[row][j]).sum();
+        (product - if i == j { 1.0 } else { 0.0 }).abs()
+    };
+    2.0 * (0..9).map(|place| entry(place / 3, place % 3)).sum::<f64>()
+}

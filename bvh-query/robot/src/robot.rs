@@ -316,7 +316,10 @@ impl Robot {
         for part in setting.parts.iter_mut().filter(|part| part.body == body) {
             let origin =
                 link.map_or(Frame::IDENTITY, |link| setting.model.links[link].origin).of(&pose.into());
+            // Pairs know how far places are from rigid ones.
+            let before = part.departure;
             part.place(origin);
+            self.is_stale |= part.departure != before;
         }
         Ok(())
     }

@@ -26,7 +26,7 @@
 //! # Cost
 //! About 20 ns for balls and capsules, and 30 to 100 ns for others, on a Zen 3 (2026-11-29). None allocates.
 
-use crate::frame::{Frame, Point, each, length};
+use crate::frame::{Frame, Point, departure, each, length};
 
 /// The inner and the outer rod of a shape, which have an axis in common.
 #[derive(Clone, Debug)]
@@ -44,7 +44,7 @@ pub(crate) struct Rods {
     pub(crate) is_solid: bool,
     /// How far anything of it is from the origins of its frame and of its group, at most.
     size: f64,
-    /// More than the departure of the rotation into the group from a rigid one.
+    /// How far the rotation into the group is from a rigid one: see [`departure`].
     departure: f64,
 }
 
@@ -108,7 +108,7 @@ impl Rods {
         };
         let far = length(origin.translation) + length(self.own.middle);
         self.size = far + self.half + across + self.radius;
-        self.departure = 2.0 * departure(&origin.rotation);
+        self.departure = departure(&origin.rotation);
     }
 
     #[inline(always)]
@@ -243,13 +243,6 @@ pub(crate) fn long([x, y]: [f64; 2]) -> f64 {
 #[inline(always)]
 fn dot(a: &Point, b: &Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Returns a bound of how far a rotation is from one with orthonormal columns: the sum of the entries of R^T R - I.
-fn departure(rotation: &[[f64; 3]; 3]) -> f64 {
-    let column = |k: usize| each(|row| rotation[row][k]);
-    let entry = |i: usize, j: usize| (dot(&column(i), &column(j)) - if i == j { 1.0 } else { 0.0 }).abs();
-    (0..9).map(|place| entry(place / 3, place % 3)).sum()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What questions are about: bodies, their shapes where they are, and the pairs that are asked about.
 
 use crate::error::RobotError;
-use crate::frame::{Frame, Point, length};
+use crate::frame::{Frame, Point, departure, length};
 use crate::model::Model;
 use crate::rod::Rods;
 use crate::rod_of::rods_of;
@@ -42,6 +42,8 @@ pub(crate) struct Part {
     /// The middle of the box around it, in its own frame, and half of the box's sides.
     pub(crate) middle_of_box: Point,
     pub(crate) half: Point,
+    /// How far its place in the group is from a rigid one, as a part of lengths; 0 if that is no more than roundings.
+    pub(crate) departure: f64,
     /// Of a ball, a capsule or a cylinder.
     pub(crate) rods: Option<Rods>,
 }
@@ -72,6 +74,7 @@ impl Part {
             radius,
             middle_of_box,
             half,
+            departure: departure_of(&origin),
             rods,
         })
     }
@@ -79,10 +82,23 @@ impl Part {
     /// Moves it to another place in its group.
     pub(crate) fn place(&mut self, origin: Frame) {
         (self.origin, self.centre) = (origin, origin.place(self.middle));
+        self.departure = departure_of(&origin);
         if let Some(rods) = &mut self.rods {
             rods.place(&origin);
         }
     }
+}
+
+fn departure_of(origin: &Frame) -> f64 {
+    let departure = departure(&origin.rotation);
+    if departure < ROUNDED_UP - 1.0 { 0.0 } else { departure }
+}
+
+/// Returns the sum of the radii of the balls around two parts, and how much nearer to each other they may be than their balls tell
+/// where their places are not rigid. The world, where balls are compared, then differs from the frame of one of them, where shapes are.
+fn reach(a: &Part, b: &Part) -> f64 {
+    let off = |part: &Part| part.departure * (length(part.origin.translation) + length(part.middle));
+    (a.radius + b.radius) * (ROUNDED_UP + a.departure + b.departure) + off(a) + off(b)
 }
 
 /// Returns the middle of the box around a shape, and half of its sides.
@@ -118,7 +134,7 @@ const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
 pub(crate) struct Pair {
     pub(crate) a: usize,
     pub(crate) b: usize,
-    /// The sum of the radii of both balls.
+    /// The sum of the radii of both balls, or a little more.
     pub(crate) reach: f64,
 }
 
@@ -150,7 +166,7 @@ impl Setting {
                         for (b, other) in (start..).zip(of_other) {
                             // An obstacle is asked about with all links, also with those that never move.
                             if one.group != other.group || one.is_still != other.is_still {
-                                pairs.push(Pair { a, b, reach: (one.radius + other.radius) * ROUNDED_UP });
+                                pairs.push(Pair { a, b, reach: reach(one, other) });
                             }
                         }
                     }
@@ -175,5 +191,43 @@ impl Setting {
     /// Returns the name of the body of a part.
     pub(crate) fn name(&self, part: usize) -> &str {
         self.bodies[self.parts[part].body].as_ref().map_or("", |body| &body.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::Base;
+    use crate::testing::robot;
+    use bvh_bake::{Options, shapes, to_bytes};
+    use bvh_query::{Bvh, Querier};
+    use cbvh_testkit::Random;
+
+    /// A block whose pose was computed in `f32` may be larger than the block, and a corner out of the ball around it.
+    #[test]
+    fn balls_hold_what_is_not_placed_rigidly() {
+        let text = "<robot name=\"one\"><link name=\"base\"><collision><geometry><sphere radius=\"1e-8\"/></geometry>\
+                    </collision></link></robot>";
+        let (bytes, _) = to_bytes(&shapes::block([2.0, 3.0, 4.0]).unwrap(), &Options::default()).unwrap();
+        let block = OwnedShape::from(Bvh::from_bytes(bytes).unwrap());
+        let (random, mut querier, mut outside) = (&mut Random::new(3), Querier::new().unwrap(), 0);
+        let mut robot = robot(text, Base::Floating);
+        robot.add_obstacle("block", block.clone(), &Pose::IDENTITY).unwrap();
+        for _ in 0..40 {
+            let exact = Pose::from_quaternion(random.quaternion(), random.point()).unwrap();
+            let rotation = exact.rotation().map(|row| row.map(|entry| f64::from(entry as f32)));
+            let pose = Pose::new(rotation, exact.translation()).unwrap();
+            robot.set_pose("block", &pose).unwrap();
+            let corner = pose.place([1.0, 1.5, 2.0]);
+            let outward: Point = std::array::from_fn(|k| corner[k] - pose.translation()[k]);
+            let at: Point = std::array::from_fn(|k| corner[k] + 0.5e-8 * outward[k] / length(outward));
+            outside += u32::from(length(outward) > length([1.0, 1.5, 2.0]) * ROUNDED_UP + 1e-8);
+            let joints = [&at[..], &[0.0, 0.0, 0.0, 1.0]].concat();
+            assert!(robot.collide(&joints).unwrap());
+            let part = &robot.setting.parts[0];
+            let relative = Frame { translation: at, ..Frame::IDENTITY }.relative(&(&pose).into());
+            assert!(querier.collide(&part.shape, &block, &relative.pose().unwrap()).unwrap());
+        }
+        assert!(outside > 5, "{outside}");
     }
 }
