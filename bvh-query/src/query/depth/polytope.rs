@@ -155,13 +155,25 @@ impl Polytope {
         true
     }
 
-    /// Returns the points of A and of B whose difference is the foot of 0 on the plane of a face, or near it.
+    /// Returns the points of A and of B whose difference is the foot of 0 on the plane of a face, or near it. A facet of the difference
+    /// has several faces in one plane: the points are those of the one around the foot.
     pub(super) fn foot(&self, face: &Face) -> [Point; 2] {
-        let corners = face.corners.map(|corner| self.corners[usize::from(corner)]);
         let foot = face.normal.map(|x| face.distance * x);
-        let [p, q, r] = corners.map(|corner| subtract(corner.difference, foot));
-        let area = |u: Point, v: Point| dot(cross(u, v), face.normal).max(0.0);
-        combined(&corners, [area(q, r), area(r, p), area(p, q)])
+        let ways =
+            |of: &Face| of.corners.map(|corner| subtract(self.corners[usize::from(corner)].difference, foot));
+        let is_in_plane = |of: &&Face| ways(of).iter().all(|way| dot(*way, face.normal).abs() <= face.error);
+        let mut best = (f64::NEG_INFINITY, [[0.0; 3]; 2]);
+        for of in std::iter::once(face).chain(self.faces.iter().filter(is_in_plane)) {
+            let [p, q, r] = ways(of);
+            let area = |u: Point, v: Point| dot(cross(u, v), face.normal);
+            let areas = [area(q, r), area(r, p), area(p, q)];
+            let least = areas.iter().fold(f64::INFINITY, |least, area| least.min(*area));
+            if least > best.0 {
+                let corners = of.corners.map(|corner| self.corners[usize::from(corner)]);
+                best = (least, combined(&corners, areas.map(|area| area.max(0.0))));
+            }
+        }
+        best.1
     }
 
     /// Returns a point that is in A and in B, but for roundings: 0 is in one of the tetrahedra between a corner and the faces.

@@ -102,6 +102,42 @@ fn points_are_on_the_surfaces_that_radii_make() {
     }
 }
 
+/// Boxes that overlap in any way touch at the points that the answer names, once B is moved out. A facet of what they have to leave
+/// is divided into triangles, only one of which has these points.
+#[test]
+fn boxes_meet_at_the_points_where_they_come_free() {
+    let (mut querier, mut random) = (Querier::new().unwrap(), Random::new(25));
+    let options = PenetrationOptions::new().relative_gap(1e-12);
+    let mut deep = 0;
+    for round in 0..400 {
+        let mut block = || {
+            let sides = random
+                .point()
+                .map(|x| 0.25 + if round % 4 < 2 { (8.0 * x.abs()).round() / 8.0 } else { x.abs() });
+            let block = bake(&shapes::block(sides).unwrap(), &Options::default());
+            OwnedShape::from(block).rounded([0.0, 0.125][round % 2]).unwrap()
+        };
+        let [a, b] = [block(), block()];
+        // Every other one is not turned, so that many directions are as good.
+        let turned = random_pose(&mut random, 0.5);
+        let [x, y, z] = turned.translation().map(|x| (8.0 * x).round() / 8.0);
+        let pose = if round % 4 < 2 { translation(x, y, z) } else { turned };
+        let found = querier.signed_distance(&a, &b, &pose, &options).unwrap();
+        if found.upper >= 0.0 {
+            continue;
+        }
+        let off = (0..3).map(|k| (found.point_b[k] + found.translation[k] - found.point_a[k]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "round {round}: {found:?}");
+        let free = moved(&pose, found.translation);
+        for (shape, pose, point) in [(&a, &Pose::IDENTITY, found.point_a), (&b, &free, found.point_a)] {
+            let away = querier.closest_point(shape.shape().at(pose), point, f64::INFINITY).unwrap().unwrap();
+            assert!(away.distance < 1e-9, "round {round}: {away:?} {found:?}");
+        }
+        deep += 1;
+    }
+    assert!(deep > 200, "{deep}");
+}
+
 /// Meshes that are not convex, shallow and deep, one in the other, and far away.
 #[test]
 fn meshes_have_the_numbers_of_distance_and_penetration() {
