@@ -137,8 +137,14 @@ impl Querier {
         self.start();
         let mut search = PairSearch::new(DistanceOptions::default(), f64::INFINITY);
         search.limit_to(limit_of_cores(a, b, limit).next_up());
-        let best = self.nearest(a, b, pose, &mut search)?;
-        best.map(|best| self.distance_of_shapes(a, b, pose, best.distance(search.proved()))).transpose()
+        match self.nearest(a, b, pose, &mut search)? {
+            Some(best) => self.distance_of_shapes(a, b, pose, best.distance(search.proved())).map(Some),
+            // Surfaces are farther apart than the limit, but what is inside a solid touches it.
+            None if self.inside_point(a, b, pose)?.is_some() => {
+                self.distance_between(a, b, pose, &DistanceOptions::default()).map(Some)
+            }
+            None => Ok(None),
+        }
     }
 
     /// Turns the distance of two cores into that of the shapes.

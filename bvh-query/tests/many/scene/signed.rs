@@ -45,3 +45,26 @@ fn the_least_signed_distance_is_that_of_all_pairs() {
     let refused = Scene::new().unwrap().signed_distance(&options.relative_gap(-1.0));
     assert!(matches!(refused, Err(SceneError::Query(_))));
 }
+
+/// A body in the middle of a solid touches it, although other pairs are nearer than its surface.
+#[test]
+fn a_body_in_a_solid_is_at_distance_zero() {
+    let [rod, unit, room] = [block([8.0, 0.125, 0.125]), block([1.0; 3]), block([16.0; 3])];
+    let turned = |y: f64| Pose::from_quaternion([0.0, 0.0, 0.5, 0.75f64.sqrt()], [100.0, y, 0.0]).unwrap();
+    for mut scene in scenes() {
+        scene.add(rod.clone(), turned(0.0)).unwrap();
+        scene.add(rod.clone(), turned(1.0)).unwrap();
+        let near = scene.distance().unwrap().unwrap().nearest.distance;
+        assert!(near > 0.0 && near < 1.0, "{near}");
+        let room = scene.add(room.clone(), Pose::IDENTITY).unwrap();
+        let inner = scene.add(unit.clone(), Pose::IDENTITY).unwrap();
+        let found = scene.distance().unwrap().unwrap();
+        assert_eq!((found.pair, found.nearest.distance), (ScenePair { a: room, b: inner }, 0.0));
+    }
+}
+
+fn block(sides: [f64; 3]) -> bvh_query::OwnedShape {
+    let block = bvh_bake::shapes::block(sides).unwrap();
+    let (bytes, _) = bvh_bake::to_bytes(&block, &bvh_bake::Options::default()).unwrap();
+    bvh_query::OwnedShape::from(bvh_query::Bvh::from_bytes(bytes).unwrap()).solid().unwrap()
+}
