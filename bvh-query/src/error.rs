@@ -106,6 +106,9 @@ pub enum NumberError {
     /// The distance to compare with.
     #[error("d: expected a finite distance of at least 0, found {0}")]
     Distance(f64),
+    /// The distance up to which two shapes are near.
+    #[error("margin: expected a finite distance of at least 0, found {0}")]
+    Margin(f64),
     /// The relative error of a distance.
     #[error("rel_err: expected a finite fraction of at least 0, found {0}")]
     RelErr(f64),

@@ -1,15 +1,19 @@
-//! The signed distance of a scene: that of the pair which overlaps most or, where none does, which is nearest.
+//! The signed distance of a scene, which is that of the pair that overlaps most or, where none does, is nearest; and those of all pairs
+//! that are near.
 
+use crate::error::NumberError;
 use crate::query::depth::options::PenetrationOptions;
 use crate::query::depth::signed_distance::SignedDistance;
+use crate::query::options::check;
 use crate::scene::pair_questions::ScenePair;
 use crate::scene::{Scene, SceneError};
 
-/// The pair of instances with the least signed distance. Points and directions are in A's frame.
+/// Two instances, and their signed distance. Points and directions are in A's frame; `scene.pose(pair.a)?.place(point)` returns a point
+/// in the world.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneSignedDistance {
-    /// The instances: of equal pairs, the first.
+    /// The instances.
     pub pair: ScenePair,
     /// The answer of [`Querier::signed_distance`](crate::Querier::signed_distance).
     pub nearest: SignedDistance,
@@ -17,7 +21,8 @@ pub struct SceneSignedDistance {
 
 impl Scene {
     /// Returns the signed distance of the pair that overlaps most, by its lower bound, or else of the nearest pair; `None` if there
-    /// are no pairs. That of any other pair is at least that lower bound, but for roundings of distances.
+    /// are no pairs. That of any other pair is at least that lower bound, but for roundings of distances. Of equal pairs, the answer
+    /// is the first.
     ///
     /// Cost: that of [`Scene::relations`], and a depth for each pair that overlaps; where none does, that of [`Scene::distance`].
     ///
@@ -42,6 +47,27 @@ impl Scene {
             querier.signed_distance(pair.a, pair.b, &pair.pose, options)
         })?;
         Ok(found.map(|nearest| SceneSignedDistance { pair: held.pair, nearest }))
+    }
+
+    /// Returns all pairs that overlap or are at most `margin` apart, in mesh units, in ascending order, with their signed distances:
+    /// those for which [`Querier::signed_distance_within`](crate::Querier::signed_distance_within) has an answer.
+    ///
+    /// Cost: that question for each pair whose boxes in the world are within the margin.
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] if the margin is negative, NaN or infinite, or if an option is invalid; the errors of
+    /// [`Scene::pairs_in_contact`], and of [`Querier::signed_distance`](crate::Querier::signed_distance).
+    pub fn near_pairs(
+        &mut self,
+        margin: f64,
+        options: &PenetrationOptions,
+    ) -> Result<Vec<SceneSignedDistance>, SceneError> {
+        check(NumberError::Margin, margin)?;
+        options.check()?;
+        self.each_near(margin, false, |querier, pair| {
+            let found = querier.signed_distance_within(pair.a, pair.b, &pair.pose, margin, options)?;
+            Ok(found.map(|nearest| SceneSignedDistance { pair: pair.ids, nearest }))
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! One number for two shapes: how far apart they are or, below zero, how deep they overlap.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::file::shape::Shape;
 use crate::narrow::{Point, unit};
 use crate::pose::Pose;
@@ -9,9 +9,11 @@ use crate::query::depth::options::PenetrationOptions;
 use crate::query::depth::penetration::Penetration;
 use crate::query::depth::translation::moved;
 use crate::query::distance::Distance;
-use crate::query::options::DistanceOptions;
+use crate::query::options::{DistanceOptions, check};
+use crate::query::pair_search::PairSearch;
 use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
+use crate::query::rounded::limit_of_cores;
 use crate::query::tracker::Tracker;
 
 /// How far apart two shapes are or, below zero, how deep they overlap.
@@ -22,6 +24,9 @@ pub struct SignedDistance {
     pub lower: f64,
     /// The signed distance is at most this, in mesh units.
     pub upper: f64,
+    /// The signed distance as one number: that of [`Querier::distance`] or, where the shapes overlap, `lower`. It is the number that
+    /// `normal` and both points belong to, as derivatives need it.
+    pub distance: f64,
     /// The direction in which B moves away from A at unit length, in A's frame: from the closest point on A to that on B or, where
     /// they overlap, along `translation`. Zero where none is known, as for shapes that touch and have no depth.
     pub normal: [f64; 3],
@@ -40,9 +45,10 @@ pub struct SignedDistance {
 
 impl SignedDistance {
     fn apart(found: &Distance, is_signed: bool) -> Self {
-        let Distance { lower, upper, point_a, point_b, .. } = *found;
+        let Distance { distance, lower, upper, point_a, point_b, .. } = *found;
         let normal = unit([0, 1, 2].map(|k| point_b[k] - point_a[k]));
-        Self { lower, upper, normal, point_a, point_b, translation: [0.0; 3], is_signed, is_spent: false }
+        let translation = [0.0; 3];
+        Self { lower, upper, distance, normal, point_a, point_b, translation, is_signed, is_spent: false }
     }
 
     fn deep(depth: &Penetration, [point_a, point_b]: [Point; 2]) -> Self {
@@ -52,6 +58,7 @@ impl SignedDistance {
         Self {
             lower,
             upper,
+            distance: lower,
             normal: unit(translation),
             point_a,
             point_b,
@@ -91,6 +98,56 @@ impl Querier {
         let (a, b) = (a.into(), b.into());
         self.start();
         self.signed_by(None, [a, b], pose, options)
+    }
+
+    /// Returns the answer of [`Querier::signed_distance`] if the shapes overlap or are at most `margin` apart, in mesh units, and
+    /// otherwise `None`. [`Querier::within`] decides exactly what is at most that far apart.
+    ///
+    /// Cost: that of `within` where they are farther apart, and a few sides of points if their boxes meet; else that of
+    /// `signed_distance`.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the margin is negative, NaN or infinite; the errors of [`Querier::signed_distance`].
+    pub fn signed_distance_within<'a>(
+        &mut self,
+        a: impl Into<Shape<'a>>,
+        b: impl Into<Shape<'a>>,
+        pose: &Pose,
+        margin: f64,
+        options: &PenetrationOptions,
+    ) -> Result<Option<SignedDistance>, QueryError> {
+        check(NumberError::Margin, margin)?;
+        options.check()?;
+        let (a, b) = (a.into(), b.into());
+        self.start();
+        let is_signed = has_inside(a)? && has_inside(b)?;
+        let limit = limit_of_cores(a, b, margin);
+        let mut search = PairSearch::new(DistanceOptions::default(), f64::INFINITY);
+        search.limit_to(limit.next_up());
+        let core = self.nearest(a, b, pose, &mut search)?.map(|best| best.distance(search.proved()));
+        let is_near = match &core {
+            // Whether the search has met the nearest triangles is certain only within the limit.
+            Some(core) => {
+                core.upper <= limit || core.lower <= limit && self.cores_within(a, b, pose, limit)?
+            }
+            None => false,
+        };
+        let found = core.filter(|_| is_near).map(|core| self.distance_of_shapes(a, b, pose, core));
+        match found.transpose()? {
+            Some(found) if !is_signed => return Ok(Some(SignedDistance::apart(&found, false))),
+            Some(found) if found.distance == 0.0 => {}
+            None if !is_signed => {
+                if self.inside_point(a, b, pose)?.is_none() {
+                    return Ok(None);
+                }
+            }
+            found => {
+                if self.relation_of_disjoint(a, b, pose)? == Relation::Apart {
+                    return Ok(found.map(|found| SignedDistance::apart(&found, true)));
+                }
+            }
+        }
+        self.signed_by(None, [a, b], pose, options).map(Some)
     }
 
     /// Returns the signed distance of two shapes, unless they are apart.

@@ -5,7 +5,8 @@ use crate::common::shapes::{cube, moved as at, outward, sphere};
 use crate::common::{Random, bake, baked, queriers, random_pose, translation};
 use bvh_bake::{Options, shapes};
 use bvh_query::{
-    Bvh, OwnedShape, PenetrationOptions, Pose, Querier, QueryError, Relation, SignedDistance, Tracker,
+    Bvh, NumberError, OwnedShape, PenetrationOptions, Pose, Querier, QueryError, Relation, SignedDistance,
+    Tracker,
 };
 
 /// Asks on all backends, through a tracker and in a batch, which all have to agree; checks what the answer says of itself.
@@ -21,7 +22,20 @@ fn signed(queriers: &mut [Querier], tracker: &mut Tracker, [a, b]: [&Bvh; 2], po
             "{}",
             querier.backend()
         );
+        let near = |querier: &mut Querier, margin| {
+            querier.signed_distance_within(a, b, pose, margin, &options).unwrap()
+        };
+        assert_eq!(near(querier, found.upper.max(0.0)), Some(found), "{}", querier.backend());
+        if found.lower > 0.0 {
+            assert_eq!(near(querier, found.lower.next_down()), None, "{}", querier.backend());
+            // Between the bounds, exact arithmetic decides.
+            let is_within = querier.within(a, b, pose, found.distance).unwrap();
+            assert_eq!(near(querier, found.distance), is_within.then_some(found), "{}", querier.backend());
+        } else {
+            assert_eq!(near(querier, 0.0), Some(found), "{}", querier.backend());
+        }
     }
+    assert!(found.lower <= found.distance && found.distance <= found.upper, "{found:?}");
     assert!(found.lower <= found.upper && found.is_signed && !found.is_spent, "{found:?}");
     let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     assert!((length(found.normal) - 1.0).abs() < 1e-12, "{found:?}");
@@ -233,4 +247,53 @@ fn what_is_not_closed_has_a_distance_only() {
         queriers[0].signed_distance(&untold, &block, &Pose::IDENTITY, &options),
         Err(QueryError::NoTopology)
     );
+}
+
+/// Shapes of all kinds are near where they are within the margin, and where they overlap without touching.
+#[test]
+fn what_is_near_is_within_the_margin_or_overlaps() {
+    let (mut queriers, mut random, options) = (queriers(), Random::new(24), PenetrationOptions::new());
+    let surface = OwnedShape::from(baked(&at(&outward(cube()), 3.0, [0.0; 3])));
+    let open = OwnedShape::from(baked(&outward(cube())[1..]));
+    let cloud = OwnedShape::from(bake(
+        &shapes::cloud(&[[0.0; 3], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]]),
+        &Options::default(),
+    ));
+    let all = [
+        surface.clone(),
+        surface.clone().solid().unwrap(),
+        surface.rounded(0.25).unwrap(),
+        OwnedShape::from(baked(&outward(sphere(1)))),
+        open,
+        cloud.clone(),
+        cloud.rounded(0.5).unwrap(),
+    ];
+    // Those that are farther apart, that are apart but near, that overlap or touch, and of these the ones whose surfaces are far apart.
+    let mut kinds = [0; 4];
+    for round in 0..600 {
+        let [a, b] = [(); 2].map(|()| &all[random.below(all.len())]);
+        let pose = random_pose(&mut random, [0.5, 4.0][round % 2]);
+        let margin = [0.0, 0.25, 1.0][random.below(3)];
+        let whole = queriers[0].signed_distance(a, b, &pose, &options).unwrap();
+        let is_within = queriers[0].within(a, b, &pose, margin).unwrap();
+        let expected = (is_within || whole.lower < 0.0).then_some(whole);
+        for querier in &mut queriers {
+            let found = querier.signed_distance_within(a, b, &pose, margin, &options).unwrap();
+            assert_eq!(found, expected, "round {round}, {}", querier.backend());
+        }
+        kinds[match expected {
+            None => 0,
+            Some(found) if found.lower > 0.0 => 1,
+            Some(_) if is_within => 2,
+            Some(_) => 3,
+        }] += 1;
+    }
+    assert!(kinds.iter().all(|&kind| kind > 20), "{kinds:?}");
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        let refused = queriers[0].signed_distance_within(&all[0], &all[1], &Pose::IDENTITY, bad, &options);
+        assert!(matches!(refused, Err(QueryError::Number(NumberError::Margin(_)))), "{refused:?}");
+    }
+    let options = options.relative_gap(0.0);
+    let refused = queriers[0].signed_distance_within(&all[0], &all[1], &Pose::IDENTITY, 1.0, &options);
+    assert!(matches!(refused, Err(QueryError::Number(NumberError::RelativeGap(_)))), "{refused:?}");
 }

@@ -325,6 +325,13 @@ fn depths_keep_to_their_budget() {
             if let Ok(found) = within_budget("signed_distance", budget, ask) {
                 assert!(-found.upper <= whole.upper && whole.lower <= -found.lower, "{found:?}, {whole:?}");
             }
+            let mut querier = Querier::new().unwrap();
+            querier.set_budget(budget);
+            let ask = || querier.signed_distance_within(forged, &block, &pose, 0.5, &options);
+            if let Ok(found) = within_budget("signed_distance_within", budget, ask) {
+                let found = found.unwrap();
+                assert!(-found.upper <= whole.upper && whole.lower <= -found.lower, "{found:?}, {whole:?}");
+            }
         }
         let found = free.penetration(forged, &block, &pose, &options).unwrap();
         assert!(found.lower <= whole.upper && whole.lower <= found.upper, "{found:?}, {whole:?}");
