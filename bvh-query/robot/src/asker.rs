@@ -2,6 +2,7 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
+use crate::near_pairs::Candidate;
 use crate::rod::are_within;
 use crate::setting::{Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
@@ -10,13 +11,15 @@ use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError,
 pub(crate) struct Asker {
     pub(crate) querier: Querier,
     /// The frames of groups of links, in the world.
-    groups: Vec<Frame>,
+    pub(crate) groups: Vec<Frame>,
     /// The middles of the balls around the parts, in the world.
     centres: Vec<Point>,
     /// More than the roundings of these places.
-    slack: f64,
+    pub(crate) slack: f64,
     /// The pair that touched last. It is likely to touch again.
     likely: usize,
+    /// Memory for the pairs that may be near.
+    pub(crate) candidates: Vec<Candidate>,
 }
 
 impl std::fmt::Debug for Asker {
@@ -38,7 +41,8 @@ impl Asker {
     }
 
     pub(crate) fn with(querier: Querier) -> Self {
-        Self { querier, groups: Vec::new(), centres: Vec::new(), slack: 0.0, likely: usize::MAX }
+        let (groups, centres, candidates) = (Vec::new(), Vec::new(), Vec::new());
+        Self { querier, groups, centres, slack: 0.0, likely: usize::MAX, candidates }
     }
 
     /// Goes to a configuration.
@@ -55,7 +59,7 @@ impl Asker {
     }
 
     /// Returns how far apart the balls around both parts are at least; negative where they meet.
-    fn gap(&self, pair: &Pair) -> f64 {
+    pub(crate) fn gap(&self, pair: &Pair) -> f64 {
         let squared = squared_distance(&self.centres[pair.a], &self.centres[pair.b]);
         squared.sqrt() - pair.reach - self.slack
     }
@@ -67,7 +71,7 @@ impl Asker {
     }
 
     /// Returns the frame of B in A's.
-    fn relative(&self, setting: &Setting, pair: &Pair) -> Frame {
+    pub(crate) fn relative(&self, setting: &Setting, pair: &Pair) -> Frame {
         self.frame(setting, pair.a).relative(&self.frame(setting, pair.b))
     }
 
@@ -252,20 +256,26 @@ impl Asker {
             if gap > 0.0 && upper.is_finite() && !self.querier.within(a, b, &pose, upper).map_err(failed)? {
                 continue;
             }
-            let mut found = self.querier.signed_distance(a, b, &pose, options).map_err(failed)?;
-            let world = self.frame(setting, pair.a);
-            let turned = Frame { translation: [0.0; 3], ..world };
-            for point in [&mut found.point_a, &mut found.point_b] {
-                *point = world.place(*point);
-            }
-            for direction in [&mut found.normal, &mut found.translation] {
-                *direction = turned.place(*direction);
-            }
+            let found = self.querier.signed_distance(a, b, &pose, options).map_err(failed)?;
             if nearest.as_ref().is_none_or(|held| (found.lower, number) < (held.1.lower, held.0)) {
                 nearest = Some((number, found));
             }
         }
-        Ok(nearest)
+        Ok(nearest.map(|(number, found)| (number, self.in_world(setting, &setting.pairs[number], found))))
+    }
+
+    /// Returns an answer about a pair with points and directions in the world.
+    pub(crate) fn in_world(&self, setting: &Setting, pair: &Pair, of: SignedDistance) -> SignedDistance {
+        let world = self.frame(setting, pair.a);
+        let turned = world.turning();
+        let mut found = of;
+        for point in [&mut found.point_a, &mut found.point_b] {
+            *point = world.place(*point);
+        }
+        for direction in [&mut found.normal, &mut found.translation] {
+            *direction = turned.place(*direction);
+        }
+        found
     }
 
     /// Returns the pairs by how far apart the balls around them are, the nearest first.
@@ -296,7 +306,7 @@ const ROUNDING: f64 = 1.0 / (1u64 << 42) as f64;
 
 /// Returns whether the boxes around two parts are apart along an axis of one, or along one that is across an axis of each (Gottschalk,
 /// Lin, Manocha, SIGGRAPH 1996).
-fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
+pub(crate) fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
     let middle = b_in_a.place(b.middle_of_box);
     let way = each(|k| middle[k] - a.middle_of_box[k]);
     let (turn, half_a, half_b) = (&b_in_a.rotation, &a.half, &b.half);

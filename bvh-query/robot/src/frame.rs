@@ -73,6 +73,11 @@ impl Frame {
         each(|k| (0..3).map(|row| self.rotation[row][k] * way[row]).sum())
     }
 
+    /// Returns the rotation alone, which turns directions.
+    pub(crate) fn turning(&self) -> Self {
+        Self { translation: [0.0; 3], ..*self }
+    }
+
     /// Returns the frame as a pose.
     pub(crate) fn pose(&self) -> Result<Pose, PoseError> {
         Pose::new(self.rotation, self.translation)

@@ -5,6 +5,7 @@
 //!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
 //!                                                  ├──> questions about configurations (questions, asker, rod)
+//!                                                  ├──> pairs that are near, with derivatives (near_pairs)
 //!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns)
 //!                                                  └──> plain data, and back (parts)
 //! ```
@@ -19,6 +20,7 @@ mod frame;
 mod mimic;
 mod model;
 mod motions;
+mod near_pairs;
 mod options;
 mod packages;
 mod pair_path;
@@ -42,6 +44,7 @@ pub use bvh_bake::input::UpAxis;
 pub use edge::Edge;
 pub use error::RobotError;
 pub use motions::RobotMotion;
+pub use near_pairs::NearPair;
 pub use options::{Base, Geometry, RobotOptions};
 pub use parts::{OtherBody, RobotParts};
 pub use questions::{RobotDistance, RobotSignedDistance};

@@ -157,7 +157,7 @@ impl Robot {
     }
 
     /// Asks about many configurations.
-    fn many<R: Send>(
+    pub(crate) fn many<R: Send>(
         &mut self,
         joints: &[f64],
         ask: impl Fn(&mut Asker, &Setting, &[f64]) -> Result<R, RobotError> + Sync,

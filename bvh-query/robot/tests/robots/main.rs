@@ -7,6 +7,7 @@ mod files;
 mod kinematics;
 mod meshes;
 mod misuse;
+mod near_pairs;
 mod parts;
 mod questions;
 mod turns;
