@@ -7,8 +7,8 @@ use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure, Record, counted, record, shown, significant, tell_warning};
 use crate::options::{not_negative, positive};
 use bvh_format::checksum::Hasher;
-use bvh_query::{Distance, MotionOptions, OwnedShape, Pose, QueryError, ReadAhead};
-use cbvh_robot::{Edge, Robot, RobotDistance, RobotError, RobotMotion, RobotOptions};
+use bvh_query::{Distance, MotionOptions, OwnedShape, PenetrationOptions, Pose, QueryError, ReadAhead};
+use cbvh_robot::{Edge, NearPair, Robot, RobotDistance, RobotError, RobotMotion, RobotOptions};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -17,6 +17,7 @@ const HELP: &str = "\
 Examples:
   cbvh robot panda.urdf --srdf panda.srdf configurations.txt
   cbvh robot panda.urdf --srdf panda.srdf --obstacle \"table.obj@1 0 0 0.5  0 1 0 0  0 0 1 -0.2\" configurations.txt --mode distance
+  cbvh robot panda.urdf --srdf panda.srdf configurations.txt --mode near --margin 0.05 --json
   cbvh robot panda.urdf --srdf panda.srdf --obstacle cell.cbvh edges.txt --edges --jobs 4 --json > answers.jsonl
   cbvh robot arm.urdf --package-dir ros/src --joints \"0 0.4 -1.2 0\"
 
@@ -30,13 +31,16 @@ Neighbours across a moving joint are asked about, unless they are disabled. Mesh
 touching it is free, unless --solid fills the obstacles. Boxes, cylinders, spheres and capsules of the URDF are solid.
 
 One answer is printed per line, in the order of FILE. collide: 1 if any two bodies touch, 0 if not. distance: the distance of the \
-nearest two bodies in metres (17 digits), 0 if they touch, inf if there are no pairs. --edges: free, hit FREE_UNTIL TOUCHING_AT, or near \
+nearest two bodies in metres (17 digits), 0 if they touch, inf if there are no pairs. near: how many pairs of bodies overlap or are at most \
+--margin apart, and the least signed distance of these, which is minus a depth where bodies overlap, or inf. --edges: free, hit FREE_UNTIL TOUCHING_AT, or near \
 FREE_UNTIL AT, as cbvh motion prints them, and as certain: no two bodies touch at any moment before FREE_UNTIL; at TOUCHING_AT \
 they do, or are at most --clearance apart; near means that they are so close that it cannot be decided within --tolerance.
 
 --json prints one object per line of FILE: configuration (with --edges: edge), its number in the file, from 0. collide has collide \
 (true or false), and if true a and b, the names of the first two bodies that touch, and pairs, all of them. distance has a and b, and the fields of \
-cbvh query --mode distance --json, with points in the world; distance is null if there are no pairs. --edges has answer (free, hit or near) and, unless \
+cbvh query --mode distance --json, with points in the world; distance is null if there are no pairs. \
+near has pairs, each with a, b, distance (signed), lower and upper (its certified bounds), point_a, point_b, normal (from a to b) in the world, \
+gradient (the derivative of the distance by each joint value), and signed (false if a body has no inside, and so no depth). --edges has answer (free, hit or near) and, unless \
 it is free, free_until, touching_at or at, and at that time joints (the joint values), a, b, and the fields of a distance.
 
 An obstacle is a mesh file or a .cbvh file. POSE places it in the world: 12 numbers, the rows of the 3 by 4 matrix [R | t], or 7: \
@@ -77,6 +81,9 @@ pub(crate) struct RobotArguments {
     /// The question
     #[arg(long, value_enum, default_value = "collide")]
     mode: Mode,
+    /// With --mode near: bodies that are at most this far apart are near, in metres
+    #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
+    margin: Option<f64>,
     /// With --edges: bodies that are at most this far apart count as a hit, in metres
     #[arg(long, value_name = "C", default_value = "0", value_parser = not_negative, allow_negative_numbers = true, requires = "edges")]
     clearance: f64,
@@ -103,6 +110,8 @@ enum Mode {
     Collide,
     /// How far apart are the nearest two bodies?
     Distance,
+    /// Which bodies are near, how far apart are they, and how does that change with the joint values?
+    Near,
 }
 
 /// Answers the question about each line of a file, or about one configuration or edge.
@@ -111,6 +120,13 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<(), Failure> {
     if arguments.edges && arguments.mode != Mode::Collide {
         return Err(Failure::usage("--edges requires --mode collide"));
     }
+    let margin = match (arguments.mode, arguments.margin) {
+        (Mode::Near, None) => return Err(Failure::usage("--mode near requires --margin D")),
+        (Mode::Collide | Mode::Distance, Some(_)) => {
+            return Err(Failure::usage("--margin requires --mode near"));
+        }
+        (_, margin) => margin.unwrap_or(0.0),
+    };
     let obstacles =
         arguments.obstacle.iter().map(|text| parse_obstacle(text)).collect::<Result<Vec<_>, _>>()?;
     let start = Instant::now();
@@ -129,7 +145,7 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<(), Failure> {
     let list = arguments.run.json || arguments.file.is_none();
     let options = MotionOptions::new().clearance(arguments.clearance).tolerance(arguments.tolerance);
     let ask = |robot: &mut Robot, question: &Question| {
-        let answer = question.ask(robot, arguments.mode, list, &options);
+        let answer = question.ask(robot, (arguments.mode, margin), list, &options);
         answer.map_err(|error| blame(&error, question, arguments))
     };
     let words = if arguments.edges { ["edge", "edges"] } else { ["configuration", "configurations"] };
@@ -304,6 +320,8 @@ enum Answer {
     Collide(bool, Vec<[String; 2]>),
     /// The nearest two bodies; none if there are no pairs.
     Distance(Option<RobotDistance>),
+    /// The bodies that are near.
+    Near(Vec<NearPair>),
     Motion(RobotMotion),
 }
 
@@ -311,7 +329,7 @@ impl Question {
     fn ask(
         &self,
         robot: &mut Robot,
-        mode: Mode,
+        (mode, margin): (Mode, f64),
         list: bool,
         options: &MotionOptions,
     ) -> Result<Answer, RobotError> {
@@ -319,6 +337,9 @@ impl Question {
             Asked::Edge(edge) => Answer::Motion(robot.motion(edge, options)?),
             Asked::Configuration(joints) => match mode {
                 Mode::Distance => Answer::Distance(robot.distance(joints)?),
+                Mode::Near => {
+                    Answer::Near(robot.near_pairs(joints, margin, &PenetrationOptions::default())?)
+                }
                 Mode::Collide if list => {
                     let pairs = robot.pairs_in_contact(joints)?;
                     Answer::Collide(!pairs.is_empty(), pairs)
@@ -371,6 +392,19 @@ fn names([a, b]: &[String; 2]) -> Record {
     record! { a: a, b: b }
 }
 
+/// Returns two bodies that are near each other as fields.
+fn near(NearPair { bodies, nearest: of, gradient, .. }: &NearPair) -> Record {
+    names(bodies).with(record! {
+        distance: of.distance, lower: of.lower, upper: of.upper, point_a: of.point_a, point_b: of.point_b,
+        normal: of.normal, gradient: gradient, signed: of.is_signed,
+    })
+}
+
+/// Returns the least signed distance of bodies that are near each other.
+fn least(pairs: &[NearPair]) -> f64 {
+    pairs.iter().fold(f64::INFINITY, |least, pair| least.min(pair.nearest.distance))
+}
+
 impl Answer {
     /// Returns the answer for a person.
     fn describe(&self) -> String {
@@ -396,6 +430,13 @@ impl Answer {
             }
             Self::Distance(None) => "no pairs of bodies can move against each other\n".to_owned(),
             Self::Distance(Some(of)) => nearest(&of.bodies, &in_world(&of.nearest, &of.points)),
+            Self::Near(pairs) => {
+                let line = |NearPair { bodies: [a, b], nearest, .. }: &NearPair| {
+                    format!("  {}  {}  {:?}\n", shown(a), shown(b), nearest.distance)
+                };
+                let lines: String = pairs.iter().map(line).collect();
+                format!("{} of bodies within the margin\n{lines}", counted(pairs.len() as u64, "pair"))
+            }
             Self::Motion(motion) => match End::of(motion) {
                 None => "free\n".to_owned(),
                 Some(End { kind, times: [free_until, at], bodies, nearest: of, .. }) => {
@@ -412,25 +453,32 @@ impl asking::Answer for Answer {
         match self {
             Self::Collide(flag, _) => *flag,
             Self::Distance(_) => self.value() <= 0.0,
+            Self::Near(pairs) => !pairs.is_empty(),
             Self::Motion(motion) => matches!(motion, RobotMotion::Hit { .. }),
         }
     }
 
-    /// Returns 1 for contact, the distance, infinite if there are no pairs, or the time of a hit.
+    /// Returns 1 for contact, the distance, infinite if there are no pairs, the number of bodies that are near, or the time of a hit.
     fn value(&self) -> f64 {
         match self {
             Self::Collide(flag, _) => f64::from(u8::from(*flag)),
             Self::Distance(of) => of.as_ref().map_or(f64::INFINITY, |of| of.nearest.distance),
+            Self::Near(pairs) => pairs.len() as f64,
             Self::Motion(RobotMotion::Hit { touching_at, .. }) => *touching_at,
             Self::Motion(_) => 0.0,
         }
     }
 
     fn line(&self) -> String {
-        let Self::Motion(motion) = self else { return significant(self.value()) };
-        End::of(motion).map_or("free".to_owned(), |End { kind, times: [free_until, at], .. }| {
-            format!("{kind} {} {}", significant(free_until), significant(at))
-        })
+        match self {
+            Self::Collide(..) | Self::Distance(_) => significant(self.value()),
+            Self::Near(pairs) => format!("{} {}", pairs.len(), significant(least(pairs))),
+            Self::Motion(motion) => {
+                End::of(motion).map_or("free".to_owned(), |End { kind, times: [free_until, at], .. }| {
+                    format!("{kind} {} {}", significant(free_until), significant(at))
+                })
+            }
+        }
     }
 
     fn json(&self) -> Record {
@@ -445,6 +493,7 @@ impl asking::Answer for Answer {
             Self::Distance(Some(of)) => {
                 names(&of.bodies).with(asking::distance_json(&in_world(&of.nearest, &of.points)))
             }
+            Self::Near(pairs) => record! { pairs: pairs.iter().map(near).collect::<Vec<_>>() },
             Self::Motion(motion) => {
                 let Some(End { kind, times: [free_until, at], joints, bodies, nearest }) = End::of(motion)
                 else {
@@ -459,11 +508,20 @@ impl asking::Answer for Answer {
         }
     }
 
-    /// Hashes a byte for contact, the bits of a distance, and for a motion a byte for the kind and the bits of both times.
+    /// Hashes a byte for contact, the bits of a distance, for bodies that are near the bits of their distances and derivatives, and for
+    /// a motion a byte for the kind and the bits of both times.
     fn hash(&self, hasher: &mut Hasher) {
         match self {
             Self::Collide(flag, _) => hasher.update(&[u8::from(*flag)]),
             Self::Distance(_) => hasher.update(&self.value().to_bits().to_le_bytes()),
+            Self::Near(pairs) => {
+                for NearPair { bodies, nearest, gradient, .. } in pairs {
+                    bodies.iter().for_each(|name| hasher.update(name.as_bytes()));
+                    let numbers = std::iter::once(&nearest.distance).chain(gradient);
+                    numbers.for_each(|number| hasher.update(&number.to_bits().to_le_bytes()));
+                }
+                hasher.update(&(pairs.len() as u64).to_le_bytes());
+            }
             Self::Motion(motion) => {
                 let (kind, times) = End::of(motion).map_or(("", [0.0; 2]), |end| (end.kind, end.times));
                 hasher.update(&[u8::from(kind == HIT) + 2 * u8::from(kind == NEAR)]);

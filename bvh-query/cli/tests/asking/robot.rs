@@ -100,6 +100,88 @@ fn contact_and_distance_follow_from_arithmetic() {
     }
 }
 
+/// The arm is a box of 1 by 0.25 by 0.25 whose near end is 1 from the axis, and the cart a cube of side 0.5. Both are on the x axis while
+/// the arm is not turned, so that the derivatives by the turn and by the slide are known.
+#[test]
+fn near_pairs_and_their_derivatives_follow_from_arithmetic() {
+    let directory = &world();
+    write_configurations(directory);
+    let ask = |margin: &str, more: &[&str]| {
+        let near = ["q.txt", "--mode", "near", "--margin", margin, "--obstacle", AT_5];
+        robot(directory, &[&near, more].concat()).done()
+    };
+    // Along x: how far the cart is from the arm, and from the cube at 4, and how these change as it slides; negative where they overlap.
+    let arm_and_cart = |slide: f64| {
+        let (before, beyond) = (1.0 - (slide + 0.25), slide - 0.25 - 2.0);
+        if before > beyond { (before, -1.0) } else { (beyond, 1.0) }
+    };
+    let cart_and_cube = |slide: f64| (4.0 - (slide + 0.25), -1.0);
+    let records = ask("1.3", &["--json"]).json_lines();
+    let lines = ask("1.3", &[]).out;
+    assert_eq!((records.len(), lines.lines().count()), (8, 8));
+    let mut seen = [0; 2];
+    for (number, (record, line)) in records.iter().zip(lines.lines()).enumerate() {
+        let ([turn, slide], ..) = CONFIGURATIONS[number];
+        assert_eq!(record["configuration"], number);
+        let pairs = record["pairs"].as_array().unwrap();
+        let mut least = f64::INFINITY;
+        let mut expected = Vec::new();
+        if turn == 0.0 && arm_and_cart(slide).0 <= 1.3 {
+            expected.push(("arm", "cart", arm_and_cart(slide)));
+        }
+        if cart_and_cube(slide).0 <= 1.3 {
+            expected.push(("cart", "cube", cart_and_cube(slide)));
+        }
+        assert_eq!(pairs.len(), expected.len(), "{record}");
+        for (pair, (a, b, (distance, slope))) in pairs.iter().zip(&expected) {
+            assert!(pair["a"] == *a && pair["b"] == *b, "{pair}");
+            let number = |name: &str| pair[name].as_f64().unwrap();
+            // Deep in the arm, the way out is across it.
+            let across = -0.125 - 0.25;
+            let (distance, slope) = if *distance < across { (across, 0.0) } else { (*distance, *slope) };
+            near(number("distance"), distance, 1e-9);
+            assert!(number("lower") <= number("distance") && number("distance") <= number("upper"), "{pair}");
+            near(number("upper"), distance, 0.01 * distance.abs() + 1e-9);
+            let gradient: Vec<f64> =
+                pair["gradient"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+            assert_eq!(gradient.len(), 2);
+            // Faces that touch have no direction that roundings do not choose.
+            if distance != 0.0 {
+                near(gradient[1], slope, 1e-9);
+            }
+            if *b == "cube" && distance != 0.0 {
+                assert_eq!(gradient[0], 0.0);
+                near(point(&pair["normal"])[0], 1.0, 1e-12);
+            }
+            least = least.min(number("distance"));
+            seen[usize::from(*b == "cube")] += 1;
+        }
+        let (count, found) = line.split_once(' ').unwrap();
+        assert_eq!(count.parse::<usize>().unwrap(), pairs.len());
+        assert!(found.parse::<f64>().unwrap() == least, "{line} {least}");
+    }
+    assert!(seen[0] >= 4 && seen[1] >= 3, "{seen:?}");
+    // Turned a little, a corner of the arm is nearest to the cart, and the turn counts.
+    let one = |turn: f64| {
+        let joints = format!("{turn:?} 0.5");
+        let record = robot(directory, &["--joints", &joints, "--mode", "near", "--margin", "1", "--json"])
+            .done()
+            .json();
+        let pair = &record["pairs"][0];
+        (pair["distance"].as_f64().unwrap(), pair["gradient"][0].as_f64().unwrap())
+    };
+    let ((before, _), (_, slope), (after, _)) = (one(0.5 - 1e-6), one(0.5), one(0.5 + 1e-6));
+    near(slope, (after - before) / 2e-6, 1e-6);
+    assert!(slope.abs() > 0.1, "{slope}");
+
+    let bench = ask("1.3", &["--bench"]).json();
+    let with_pairs = records.iter().filter(|record| !record["pairs"].as_array().unwrap().is_empty()).count();
+    assert!(bench["mode"] == "near" && bench["positives"] == with_pairs, "{bench}");
+    // The cart is 1.25 beyond the arm once.
+    assert_ne!(bench["answers_xxh3"], ask("1.2", &["--bench"]).json()["answers_xxh3"]);
+    assert_eq!(ask("0", &["--limit", "1"]).out, "0 inf\n");
+}
+
 fn point(value: &Value) -> [f64; 3] {
     [0, 1, 2].map(|k| value[k].as_f64().unwrap())
 }
@@ -177,7 +259,8 @@ fn answers_depend_neither_on_the_backend_nor_on_threads() {
     let directory = &world();
     write_configurations(directory);
     directory.write("e.txt", "0 2.5 0 8\n-1 2.5 1 2.5\n");
-    for more in [&["q.txt"][..], &["q.txt", "--mode", "distance"], &["e.txt", "--edges"]] {
+    let near = ["q.txt", "--mode", "near", "--margin", "1"];
+    for more in [&["q.txt"][..], &["q.txt", "--mode", "distance"], &near, &["e.txt", "--edges"]] {
         let mut hashes = Vec::new();
         for isa in backends(directory) {
             for jobs in ["1", "2"] {
@@ -218,6 +301,8 @@ fn one_configuration_is_answered_for_a_person() {
     assert_eq!(one("0 1.5", &[]).out, "1 pair of bodies in contact\n  arm  cart\n");
     let said = one("0 0.5", &["--mode", "distance"]).out;
     assert!(said.starts_with("arm and cart: distance 0.25\n  certainly 0.2"), "{said}");
+    let said = one("0 0.5", &["--mode", "near", "--margin", "1"]).out;
+    assert_eq!(said, "1 pair of bodies within the margin\n  arm  cart  0.25\n");
     assert_eq!(one("-1 2.5 1 2.5", &["--edges"]).out, "free\n");
     let said = one("0 2.5 0 4.5", &["--edges", "--obstacle", AT_5]).out;
     assert!(said.starts_with("free until 0.62") && said.contains("cart and cube: distance 0.0"), "{said}");
@@ -279,7 +364,13 @@ fn bad_questions_are_named() {
     robot(directory, &["--joints", "0 nan"]).failed(3, &["--joints: joint slide: expected a finite value"]);
     directory.write("q.txt", "0 0\n");
     robot(directory, &["q.txt", "--edges", "--mode", "distance"]).failed(1, &["--edges requires"]);
-    robot(directory, &["q.txt", "--mode", "near"]).failed(1, &["--mode", "near"]);
+    robot(directory, &["q.txt", "--mode", "near"]).failed(1, &["--mode near requires --margin D"]);
+    robot(directory, &["q.txt", "--margin", "1"]).failed(1, &["--margin requires --mode near"]);
+    for margin in ["-1", "nan", "inf", "x"] {
+        robot(directory, &["q.txt", "--mode", "near", "--margin", margin]).failed(1, &["--margin", margin]);
+    }
+    robot(directory, &["q.txt", "--edges", "--mode", "near", "--margin", "1"])
+        .failed(1, &["--edges requires"]);
     robot(directory, &["q.txt", "--clearance", "1"]).failed(1, &["--edges"]);
     robot(directory, &["q.txt", "--solid"]).failed(1, &["--obstacle"]);
     robot(directory, &["q.txt", "--isa", "mmx"]).failed(1, &["mmx"]);
