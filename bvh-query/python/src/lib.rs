@@ -71,6 +71,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         scene_pairs::scene_contacts,
         scene_pairs::scene_distance,
         scene_pairs::scene_signed_distance,
+        scene_pairs::scene_near_pairs,
         scene_pairs::scene_motion,
         scene_pairs::scene_is_free
     ];

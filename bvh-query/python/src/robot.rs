@@ -1,17 +1,18 @@
 //! Robots: a question takes a snapshot, and runs without Python's lock and without that of the robot.
 
 use crate::answers::{Answers, array, matrix, signed_distances};
-use crate::arguments::pose_or_identity;
+use crate::arguments::{number, pose_or_identity};
 use crate::asking::{detached, in_turns, on_pool};
 use crate::errors::{backend_error, bake_error, open_error, query_error, question_error, system_error};
 use crate::mesh::Mesh;
 use crate::pairs::depth_options;
 use crate::paths::locked;
-use bvh_query::{MotionOptions, OwnedShape, Pose};
+use bvh_query::{MotionOptions, NumberError, OwnedShape, Pose};
 use cbvh_robot::{
-    Base, Edge, Geometry, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions, RobotParts, UpAxis,
+    Base, Edge, Geometry, NearPair, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions,
+    RobotParts, UpAxis,
 };
-use numpy::{PyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -48,6 +49,9 @@ type Parts =
 type Nearest = (bool, [f64; 3], [String; 2], [[f64; 3]; 2]);
 /// The names of both bodies, if there are any, for each row, and the parts of the signed distances, in the world.
 type NearestSigned<'py> = (Vec<Option<[String; 2]>>, Bound<'py, PyTuple>);
+/// The names of both bodies of each near pair, and the numbers of rows, distances, bounds, points, normals, derivatives and whether there
+/// is a depth.
+type Near<'py> = (Vec<String>, Vec<String>, Bound<'py, PyTuple>);
 /// A named configuration: its group, its name, and values at the places of joints.
 type State = (String, String, Vec<(usize, f64)>);
 /// How a motion ends: 0 free, 1 hit, 2 near; until when it is free, when it ends, with what joint values, bodies and distance.
@@ -516,6 +520,53 @@ impl Robot {
         let nearest = found.iter().map(|of| of.as_ref().map(|of| of.nearest));
         let nearest = signed_distances(Answers { py, one }, nearest)?;
         Ok((found.into_iter().map(|of| of.map(|of| of.bodies)).collect(), nearest))
+    }
+
+    /// Finds the near pairs of all rows, one row after the other.
+    fn near_pairs<'py>(
+        &self,
+        py: Python<'py>,
+        joints: PyReadonlyArray2<'_, f64>,
+        margin: &Bound<'py, PyAny>,
+        relative_gap: &Bound<'py, PyAny>,
+        tolerance: Option<&Bound<'py, PyAny>>,
+        parallel: bool,
+    ) -> PyResult<Near<'py>> {
+        let width = joints.as_array().ncols();
+        let (rows, margin) = (rows(&joints)?, number(margin, "margin")?);
+        let options = depth_options(relative_gap, tolerance)?;
+        // Without rows, too, numbers are checked.
+        if !(0.0..f64::INFINITY).contains(&margin) {
+            return Err(query_error(NumberError::Margin(margin).into()));
+        }
+        options.check().map_err(query_error)?;
+        let found = self.each(
+            py,
+            &rows,
+            parallel,
+            |robot, row| robot.near_pairs(row, margin, &options),
+            |robot, rows| robot.near_pairs_many(rows, margin, &options),
+        )?;
+        let numbers = found.iter().enumerate().flat_map(|(row, pairs)| pairs.iter().map(move |_| row as i64));
+        let pairs = || found.iter().flatten();
+        let many = Answers { py, one: false };
+        let values = |of: fn(&NearPair) -> f64| many.values(pairs().map(of));
+        let points = |of: fn(&NearPair) -> [f64; 3]| many.rows(pairs().map(of));
+        let gradients: Vec<f64> = pairs().flat_map(|pair| pair.gradient.iter().copied()).collect();
+        let parts = (
+            array(py, numbers),
+            values(|of| of.nearest.distance)?,
+            values(|of| of.nearest.lower)?,
+            values(|of| of.nearest.upper)?,
+            points(|of| of.nearest.point_a)?,
+            points(|of| of.nearest.point_b)?,
+            points(|of| of.nearest.normal)?,
+            PyArray1::from_vec(py, gradients).reshape([pairs().count(), width])?,
+            many.values(pairs().map(|of| of.nearest.is_signed))?,
+        )
+            .into_pyobject(py)?;
+        let (a, b) = found.into_iter().flatten().map(|NearPair { bodies: [a, b], .. }| (a, b)).unzip();
+        Ok((a, b, parts))
     }
 
     fn is_free<'py>(

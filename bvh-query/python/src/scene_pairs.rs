@@ -17,6 +17,9 @@ type Pairs<'py> = Bound<'py, PyArray2<i64>>;
 /// A pair and its distance or signed distance, or `None` where there is no pair.
 type Nearest<'py> = Option<(i64, i64, Bound<'py, PyTuple>)>;
 
+/// Pairs, their signed distances as numbers, and all parts of these.
+type Near<'py> = (Pairs<'py>, Bound<'py, PyArray1<f64>>, Bound<'py, PyTuple>);
+
 fn nearest<'py>(py: Python<'py>, found: Option<([i64; 2], Distance)>) -> PyResult<Nearest<'py>> {
     let Some(([a, b], nearest)) = found else { return Ok(None) };
     let nearest = answers::distances(Answers { py, one: true }, std::iter::once(Some(nearest)))?;
@@ -121,6 +124,28 @@ pub(crate) fn scene_signed_distance<'py>(
     let Some(([a, b], nearest)) = found else { return Ok(None) };
     let nearest = answers::signed_distances(Answers { py, one: true }, std::iter::once(Some(nearest)))?;
     Ok(Some((a, b, nearest)))
+}
+
+#[pyfunction]
+pub(crate) fn scene_near_pairs<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    margin: &Bound<'py, PyAny>,
+    relative_gap: &Bound<'py, PyAny>,
+    tolerance: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Near<'py>> {
+    let (margin, options) = (number(margin, "margin")?, depth_options(relative_gap, tolerance)?);
+    let found = scene.ask(
+        py,
+        |scene| scene.near_pairs(margin, &options),
+        |state, found| found.into_iter().map(|of| (state.pair(of.pair), of.nearest)).collect::<Vec<_>>(),
+    )?;
+    let nearest = found.iter().map(|(_, nearest)| Some(*nearest));
+    Ok((
+        table(py, found.iter().map(|(pair, _)| *pair))?,
+        array(py, found.iter().map(|(_, nearest)| nearest.distance)),
+        answers::signed_distances(Answers { py, one: false }, nearest)?,
+    ))
 }
 
 /// Instances and their paths.

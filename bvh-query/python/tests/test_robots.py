@@ -383,6 +383,107 @@ class Describing(unittest.TestCase):
 class Asking(unittest.TestCase):
     """Answers beside those about meshes."""
 
+    def test_near_pairs_are_those_of_meshes(self):
+        robot, bodies = cell()
+        rows, kinematics, margin = random_rows(robot, 5, 60), Kinematics(URDF), 0.15
+        of = {name: (link, mesh, pose) for name, link, mesh, pose in bodies}
+
+        def of_meshes(row):
+            values = dict(zip(robot.joints, row))
+            world = {n: (kinematics.pose(link, values) if link else np.eye(4)) @ pose for n, (link, _, pose) in of.items()}
+            for a, b in robot.pairs:
+                found = of[a][1].signed_distance(of[b][1], cbvh.relative(world[a], world[b]))
+                yield (a, b), world[a], found
+
+        compared = {"bodies": 0, "overlapping": 0, "slopes": 0}
+        for row in rows:
+            found = robot.near_pairs(row, margin)
+            expected = [(pair, world, of_pair) for pair, world, of_pair in of_meshes(row) if of_pair.upper <= margin]
+            self.assertEqual([(pair.a, pair.b) for pair in found], [pair for pair, *_ in expected])
+            for pair, (_, world, of_pair) in zip(found, expected):
+                overlaps = of_pair.lower < 0
+                # A search for a depth ends within one per cent.
+                tolerance = 0.02 * abs(of_pair.lower) if overlaps else 1e-9
+                np.testing.assert_allclose([pair.lower, pair.upper], [of_pair.lower, of_pair.upper], rtol=0, atol=tolerance)
+                self.assertTrue(pair.lower <= pair.distance <= pair.upper and isinstance(pair.distance, float))
+                self.assertEqual((pair.gradient.shape, pair.is_signed), ((4,), of_pair.is_signed))
+                compared["bodies"] += 1
+                compared["overlapping"] += overlaps
+                if not 1e-3 < pair.distance:
+                    continue
+                for point, there in [(pair.point_a, of_pair.point_a), (pair.point_b, of_pair.point_b)]:
+                    np.testing.assert_allclose(point, world[:3, :3] @ there + world[:3, 3], atol=1e-8)
+                np.testing.assert_allclose(pair.normal * pair.distance, pair.point_b - pair.point_a, atol=1e-9)
+                for number in range(4):
+                    step = np.zeros(4)
+                    step[number] = 1e-6
+                    before, after = (
+                        next(of_pair.lower for bodies, _, of_pair in of_meshes(moved) if bodies == (pair.a, pair.b))
+                        for moved in (row - step, row + step)
+                    )
+                    # The nearest points jump hardly ever.
+                    if abs(after - 2 * pair.distance + before) < 1e-10:
+                        self.assertAlmostEqual(pair.gradient[number], (after - before) / 2e-6, delta=1e-6)
+                        compared["slopes"] += 1
+        self.assertTrue(compared["bodies"] > 60 and compared["overlapping"] > 10 and compared["slopes"] > 150, compared)
+
+        for parallel in (False, True):
+            many = robot.near_pairs(rows, margin, parallel=parallel)
+            single = [(number, pair) for number, row in enumerate(rows) for pair in robot.near_pairs(row, margin)]
+            self.assertEqual(many.row.tolist(), [number for number, _ in single])
+            for name in cbvh.NearPair._fields:
+                column = [getattr(pair, name) for _, pair in single]
+                np.testing.assert_array_equal(np.array(getattr(many, name)), np.array(column))
+        self.assertEqual((many.gradient.shape, many.point_a.shape), ((len(single), 4), (len(single), 3)))
+        self.assertEqual((many.row.dtype, many.is_signed.dtype), (np.int64, np.bool_))
+
+        none = robot.near_pairs(np.zeros((0, 4)), margin)
+        self.assertEqual((none.row.shape, none.a, none.gradient.shape, none.normal.shape), ((0,), [], (0, 4), (0, 3)))
+        # Those that are near are the pairs that are asked about.
+        self.assertEqual([(pair.a, pair.b) for pair in robot.near_pairs(rows[0], 99)], robot.pairs)
+        robot.allow("upper_arm", "pillar")
+        robot.remove("ball")
+        self.assertEqual([(pair.a, pair.b) for pair in robot.near_pairs(rows[0], 99)], robot.pairs)
+        wrong = [-1, -1e-300, math.nan, math.inf, -math.inf]
+        check_errors(
+            self,
+            [(ValueError, "margin: expected a finite distance of at least 0", robot.near_pairs, rows[0], bad) for bad in wrong]
+            + [(ValueError, "margin: expected a finite distance", robot.near_pairs, np.zeros((0, 4)), bad) for bad in wrong]
+            + [
+                (TypeError, "margin: expected a number", robot.near_pairs, rows[0], "far"),
+                (ValueError, "q: expected shape (4,) or (N, 4)", robot.near_pairs, rows[0][:3], 1),
+                (ValueError, "relative_gap", lambda: robot.near_pairs(rows[0], 1, relative_gap=0)),
+                (ValueError, "tolerance", lambda: robot.near_pairs(rows[:0], 1, tolerance=-1)),
+                (ValueError, "joint elbow: expected a finite value", robot.near_pairs, [0, 0, math.nan, 0], 1),
+            ],
+        )
+
+    def test_derivatives_of_all_kinds_of_joints(self):
+        # Points where the robot stands in the frames of numpy, moved by one joint value at a time.
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "kinds.urdf"
+            path.write_text(KINDS.replace('<link name="g"/>', '<link name="g"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>'))
+            robot = cbvh.Robot.from_urdf(path)
+        random, compared = np.random.default_rng(6), 0
+        places = [robot.joints.index(f"float/q{axis}") for axis in "xyzw"]
+        for _ in range(20):
+            q = random.uniform(-0.5, 0.5, len(robot.joints))
+            q[places] = random.normal(size=4) * random.uniform(0.5, 2)
+            for pair in robot.near_pairs(q, 9.0):
+                alone = robot.copy()
+                for a, b in robot.pairs:
+                    if (a, b) != (pair.a, pair.b):
+                        alone.allow(a, b)
+                if pair.distance < 1e-3:
+                    continue
+                steps = 1e-6 * np.eye(len(q))
+                before, after = (alone.distance(moved).distance for moved in (q - steps, q + steps))
+                smooth = np.abs(before - 2 * pair.distance + after) < 1e-10
+                np.testing.assert_allclose(pair.gradient[smooth], ((after - before) / 2e-6)[smooth], atol=1e-6)
+                self.assertAlmostEqual(np.dot(pair.gradient[places], q[places]), 0, delta=1e-12)
+                compared += smooth.sum()
+        self.assertGreater(compared, 1000)
+
     def test_pairs_are_those_of_meshes(self):
         robot, bodies = cell()
         self.assertEqual(robot.joints, ["waist", "shoulder", "elbow", "wrist"])

@@ -162,6 +162,34 @@ class Pairs(unittest.TestCase):
                 scene.set_allowed(a, b, of_pair.lower <= 0)
         self.assertEqual(signs, [-1, 1])
 
+    def test_near_pairs_are_those_of_meshes(self):
+        scene, margin = self.scene(1), 0.5
+        asked = Asked(scene)
+        expected = []
+        for a, b, of_a, of_b, _ in asked.pairs:
+            found = of_a.signed_distance(of_b, cbvh.relative(scene.pose(a), scene.pose(b)))
+            if found.upper <= margin:
+                expected.append(((a, b), found))
+        signs = {found.lower > 0 for _, found in expected}
+        self.assertTrue(signs == {False, True} and len(expected) < len(asked.pairs), (len(expected), len(asked.pairs)))
+        for scene.parallel, scene.tracking in itertools.product((False, True), repeat=2):
+            near = scene.near_pairs(margin)
+            self.assertEqual([tuple(pair) for pair in near.pairs.tolist()], [pair for pair, _ in expected])
+            for number, (_, of_pair) in enumerate(expected):
+                for part, of_part in zip(near.nearest, of_pair):
+                    np.testing.assert_array_equal(part[number], of_part)
+            self.assertTrue(np.all((near.nearest.lower <= near.distance) & (near.distance <= near.nearest.upper)))
+        none = cbvh.Scene().near_pairs(1)
+        self.assertEqual((none.pairs.shape, none.distance.shape, none.nearest.normal.shape), ((0, 2), (0,), (0, 3)))
+        check_errors(
+            self,
+            [(ValueError, "margin: expected a finite distance", scene.near_pairs, bad) for bad in (-1, np.nan, np.inf)]
+            + [
+                (TypeError, "margin: expected a number", scene.near_pairs, None),
+                (ValueError, "relative_gap", lambda: scene.near_pairs(1, relative_gap=-1)),
+            ],
+        )
+
     def test_a_block_passes_through_another_one(self):
         # The third one is always 0.75 from the large one, which it faces.
         scene, around = cbvh.Scene(), random_poses(9, 1, 5.0)[0]

@@ -21,7 +21,8 @@ Matrices with eight digits after the point are. `nearest_pose` makes a pose from
 
 **Overlap.** `Mesh.penetration` bounds how deep closed meshes overlap, and gives a translation that separates them.
 `Mesh.signed_distance` is one number for both: the distance of meshes that are apart, and minus the depth of others. Scenes
-and robots have it for the pair whose number is the least.
+and robots have it for the pair whose number is the least, and `Scene.near_pairs` and `Robot.near_pairs` for all pairs that are near:
+for robots with its derivative by each joint value, as planners that optimise need it.
 `Mesh.clash` and `Scene.clashes` tell parts that touch from parts that overlap, are near, contain each other or are there twice.
 `Mesh.intersection` measures what closed meshes have in common: volume, box, and how thick the one is where the other pierces it.
 `Mesh.contact_regions` and `Mesh.patches` tell where and how surfaces meet, and `Mesh.self_contacts` where a mesh meets
@@ -75,6 +76,7 @@ from ._answers import (
     SceneDistance,
     SceneDistances,
     SceneMotionAnswer,
+    SceneNearPairs,
     ScenePenetrations,
     SceneRayHit,
     SceneRelations,
@@ -90,7 +92,7 @@ from ._cbvh import BakeError, FormatError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._poses import nearest_pose, pose, relative
-from ._robot import InsideWarning, Robot, RobotDistance, RobotMotion, RobotSignedDistance, _robot_of
+from ._robot import InsideWarning, NearPair, NearPairs, Robot, RobotDistance, RobotMotion, RobotSignedDistance, _robot_of
 from ._scene import Scene, _scene_of
 from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
 from ._view import View
@@ -113,6 +115,8 @@ __all__ = [
     "Motion",
     "MotionAnswer",
     "MotionKind",
+    "NearPair",
+    "NearPairs",
     "OpenEdge",
     "OpenEdges",
     "Patches",
@@ -133,6 +137,7 @@ __all__ = [
     "SceneDistance",
     "SceneDistances",
     "SceneMotionAnswer",
+    "SceneNearPairs",
     "ScenePenetrations",
     "SceneRayHit",
     "SceneRelations",

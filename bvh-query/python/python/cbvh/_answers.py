@@ -502,6 +502,20 @@ class SceneSignedDistance(NamedTuple):
     nearest: SignedDistance
 
 
+class SceneNearPairs(NamedTuple):
+    """The pairs of instances that overlap or are near each other, in their order.
+
+    - ``pairs``: numbers of instances, A and B, shape (K, 2).
+    - ``distance``: the signed distances as numbers, between both bounds: the distance or, where two overlap, ``nearest.lower``. Shape
+      (K,).
+    - ``nearest``: the answers of `Mesh.signed_distance`, arrays of K elements or rows, with points and directions in A's frame.
+    """
+
+    pairs: NDArray[np.int64]
+    distance: Floats
+    nearest: SignedDistance
+
+
 class SceneDistances(NamedTuple):
     """Pairs of instances, and how far apart they are.
 

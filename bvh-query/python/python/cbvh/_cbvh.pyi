@@ -73,6 +73,7 @@ __all__ = [
     "scene_distance",
     "scene_is_free",
     "scene_motion",
+    "scene_near_pairs",
     "scene_pairs_in_contact",
     "scene_pairs_within",
     "scene_relations",
@@ -220,6 +221,9 @@ class Robot:
     def signed_distance(
         self, joints: _Floats, one: bool, relative_gap: float, tolerance: float | None, parallel: bool
     ) -> tuple[list[list[str] | None], _Parts]: ...
+    def near_pairs(
+        self, joints: _Floats, margin: float, relative_gap: float, tolerance: float | None, parallel: bool
+    ) -> tuple[list[str], list[str], _Parts]: ...
     def is_free(
         self, from_: _Floats, to: _Floats, clearance: float, tolerance: float | None, parallel: bool
     ) -> NDArray[np.bool_]: ...
@@ -343,6 +347,9 @@ def scene_clashes(scene: Scene, limits: _ClashLimits) -> tuple[_Pairs, _Parts]: 
 def scene_contacts(scene: Scene) -> tuple[_Pairs, _Ids]: ...
 def scene_distance(scene: Scene) -> _Nearest: ...
 def scene_signed_distance(scene: Scene, relative_gap: float, tolerance: float | None) -> _Nearest: ...
+def scene_near_pairs(
+    scene: Scene, margin: float, relative_gap: float, tolerance: float | None
+) -> tuple[_Pairs, _Floats, _Parts]: ...
 def scene_motion(
     scene: Scene, numbers: list[int], paths: list[Any], clearance: float, tolerance: float | None
 ) -> tuple[int, float, float, _Nearest]: ...

@@ -42,6 +42,52 @@ class RobotSignedDistance(NamedTuple):
     and translation in the world. If no pairs are asked about, the bounds are infinite, and the other numbers NaN."""
 
 
+class NearPair(NamedTuple):
+    """Two bodies that overlap or are near each other: see `Robot.near_pairs`."""
+
+    a: str
+    """The name of the first body."""
+    b: str
+    """The name of the second body."""
+    distance: float
+    """The signed distance: the distance or, where they overlap, ``lower``."""
+    lower: float
+    """A certified lower bound of the signed distance."""
+    upper: float
+    """A certified upper bound of it."""
+    point_a: Floats
+    """The closest point of A in the world or, where they overlap, the one that B touches where it comes free. Shape (3,)."""
+    point_b: Floats
+    """The closest point of B in the world or, where they overlap, the one that comes to ``point_a``."""
+    normal: Floats
+    """The direction in which B moves away from A, in the world, at unit length; 0 where none is known. Shape (3,)."""
+    gradient: Floats
+    """The derivative of ``distance`` by each joint value, in the order of `Robot.joints`. Shape (n,)."""
+    is_signed: bool
+    """Whether both bodies have an inside, and so a depth where they overlap."""
+
+
+class NearPairs(NamedTuple):
+    """The near pairs of N configurations, K in all: first those of the first configuration. See `NearPair` for the fields."""
+
+    row: NDArray[np.int64]
+    """The configuration of each pair, from 0. Shape (K,)."""
+    a: list[str]
+    b: list[str]
+    distance: Floats
+    """Shape (K,), like the bounds."""
+    lower: Floats
+    upper: Floats
+    point_a: Floats
+    """Shape (K, 3), like ``point_b`` and ``normal``."""
+    point_b: Floats
+    normal: Floats
+    gradient: Floats
+    """Shape (K, n)."""
+    is_signed: NDArray[np.bool_]
+    """Shape (K,)."""
+
+
 class RobotMotion(NamedTuple):
     """How a motion in joint space ends."""
 
@@ -425,6 +471,43 @@ class Robot:
         names, parts = self._robot.signed_distance(rows, one, relative_gap, tolerance, parallel)
         bodies = [None if of is None else tuple(of) for of in names]
         return RobotSignedDistance(bodies[0] if one else bodies, SignedDistance(*parts))
+
+    def near_pairs(
+        self,
+        q: ArrayLike,
+        margin: float,
+        *,
+        relative_gap: float = 0.01,
+        tolerance: float | None = None,
+        parallel: bool = False,
+    ) -> Any:
+        """The bodies that overlap or are at most ``margin`` apart, in the order of `pairs`: a list of `NearPair` or, for N
+        configurations, `NearPairs` with arrays. Planners that optimise a path use them as constraints or costs.
+
+        It is decided exactly which bodies are at most that far apart. The distances are signed, as those of `signed_distance` are, and
+        ``gradient`` is the derivative of ``distance`` by each joint value:
+
+        >>> for pair in robot.near_pairs(q, 0.05):                              # doctest: +SKIP
+        ...     q += (0.05 - pair.distance) * pair.gradient
+
+        Where several points are equally near, as on parallel faces, the distance has a bend, and the derivative is that of one of
+        these pairs of points: a subgradient. Where bodies overlap, it is the derivative along the way out that was found, of ``lower``,
+        which a lower ``relative_gap`` brings nearer to the depth. It is 0 where the normal is, as for bodies that touch and have no
+        depth. A floating joint has one by each number of its quaternion, which is divided by its length first.
+
+        ``relative_gap`` and ``tolerance`` end the search for each depth, as in `Mesh.signed_distance`. Raises ValueError if a number is
+        wrong, or if a mesh in question was baked without topology. Cost: that of `pairs_in_contact`, and a distance or a depth for
+        each pair that is near.
+        """
+        rows, one = self._rows(q)
+        a, b, parts = self._robot.near_pairs(rows, margin, relative_gap, tolerance, parallel)
+        row, *columns = parts
+        if not one:
+            return NearPairs(row, a, b, *columns)
+        distance, lower, upper, point_a, point_b, normal, gradient, is_signed = columns
+        numbers = zip(distance.tolist(), lower.tolist(), upper.tolist())
+        rest = zip(point_a, point_b, normal, gradient, is_signed.tolist())
+        return [NearPair(*names, *of, *more) for names, of, more in zip(zip(a, b), numbers, rest)]
 
     def is_free(
         self,

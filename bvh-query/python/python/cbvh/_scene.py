@@ -25,6 +25,7 @@ from ._answers import (
     SceneDistance,
     SceneDistances,
     SceneMotionAnswer,
+    SceneNearPairs,
     ScenePenetrations,
     SceneRayHit,
     SceneRelations,
@@ -387,6 +388,18 @@ class Scene:
             return None
         a, b, nearest = found
         return SceneSignedDistance(a, b, SignedDistance(*nearest))
+
+    def near_pairs(self, margin: float, *, relative_gap: float = 0.01, tolerance: float | None = None) -> SceneNearPairs:
+        """All pairs that overlap or are at most ``margin`` mesh units apart, with their signed distances: the distance, or minus the
+        depth.
+
+        It is decided exactly which pairs are at most that far apart. A pair of which one is inside the other overlaps, if both are
+        closed. Points, normals and translations are in A's frame. ``relative_gap`` and ``tolerance`` end the search for each depth,
+        as in `Mesh.signed_distance`. Raises ValueError if a number is wrong, or if a mesh in question was baked without topology.
+        Cost: that of `pairs_within`, and a distance or a depth for each pair that is near.
+        """
+        pairs, distance, nearest = _cbvh.scene_near_pairs(self._scene, margin, relative_gap, tolerance)
+        return SceneNearPairs(pairs, distance, SignedDistance(*nearest))
 
     def distances(
         self, pairs: ArrayLike | None = None, *, within: float | None = None, parallel: bool = False
