@@ -1191,6 +1191,15 @@ typedef struct cbvh_scene_signed_distance_answer {
     int32_t reserved;
 } cbvh_scene_signed_distance_answer;
 
+/* A pair that overlaps or is near, and its signed distance. */
+typedef struct cbvh_scene_near_pair {
+    cbvh_scene_pair pair;
+    /* The signed distance as one number, between both bounds: the distance or, where the pair overlaps, `nearest.lower`. */
+    double distance;
+    /* As cbvh_signed_distances answers, in A's frame. */
+    cbvh_signed_distance nearest;
+} cbvh_scene_near_pair;
+
 /* The relation of a pair. */
 typedef struct cbvh_scene_relation {
     cbvh_scene_pair pair;
@@ -1237,6 +1246,12 @@ cbvh_status cbvh_scene_signed_distance(cbvh_scene scene, const cbvh_penetration_
 cbvh_status cbvh_scene_pairs_in_contact(cbvh_scene scene, cbvh_scene_pair *pairs, size_t capacity, size_t *count);
 /* Lists all pairs at most `d` apart, in ascending order. */
 cbvh_status cbvh_scene_pairs_within(cbvh_scene scene, double d, cbvh_scene_pair *pairs, size_t capacity, size_t *count);
+/* Lists all pairs that overlap or are at most `margin` apart, in ascending order, with their signed distances. It is decided
+ * exactly which are at most that far apart, and a pair of which one is inside the other overlaps, if both are closed. It
+ * takes the time of cbvh_scene_pairs_within, and of a distance or a depth for each pair that is near.
+ * CBVH_INVALID_ARGUMENT if the margin is negative or not finite, or if a file in question was baked without topology. */
+cbvh_status cbvh_scene_near_pairs(cbvh_scene scene, double margin, const cbvh_penetration_options *options,
+                                  cbvh_scene_near_pair *pairs, size_t capacity, size_t *count);
 /* Lists all pairs that touch, or of which one is inside the other, wholly or in part, with their relations. */
 cbvh_status cbvh_scene_relations(cbvh_scene scene, cbvh_scene_relation *relations, size_t capacity, size_t *count);
 /* Lists all pairs of triangles in contact. */
@@ -1458,6 +1473,15 @@ typedef struct cbvh_robot_signed_distance_answer {
     int32_t reserved;
 } cbvh_robot_signed_distance_answer;
 
+/* A pair of bodies that overlap or are near each other, and their signed distance. */
+typedef struct cbvh_robot_near_pair {
+    cbvh_body_pair pair;
+    /* The signed distance as one number, between both bounds: the distance or, where the pair overlaps, `nearest.lower`. */
+    double distance;
+    /* Its points, normal and translation are in the world. */
+    cbvh_signed_distance nearest;
+} cbvh_robot_near_pair;
+
 /* Lists the poses of all links in the world, in the order of cbvh_robot_links, configuration after configuration. */
 cbvh_status cbvh_robot_link_poses(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                   cbvh_pose *poses, size_t capacity, size_t *pose_count);
@@ -1476,6 +1500,22 @@ cbvh_status cbvh_robot_signed_distances(cbvh_robot robot, const double *joints, 
 /* Lists the pairs that touch, configuration after configuration. `counts` gets the number of each, and may be NULL. */
 cbvh_status cbvh_robot_pairs_in_contact(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                         size_t *counts, cbvh_body_pair *pairs, size_t capacity, size_t *pair_count);
+/* Lists the pairs that overlap or are at most `margin` apart, in the order of cbvh_robot_pairs, configuration after
+ * configuration, with the derivative of each `distance` by each joint value, as planners that optimise a path need it. It
+ * is decided exactly which pairs are at most that far apart. `counts` gets the number of each configuration, and may be
+ * NULL. `gradients` has room for `capacity` times `joint_count` numbers, those of each pair one after the other, and may be
+ * NULL.
+ *
+ * A derivative is that of the points in the answer. Where others are equally near, as on parallel faces, the signed
+ * distance has a bend, and the derivative is that of one of them: a subgradient. Where bodies overlap, it is along the way
+ * out that was found, which a lower `relative_gap` brings nearer to the shortest one. It is 0 where the normal is. A
+ * floating joint has a derivative by each number of its quaternion, which is divided by its length first.
+ *
+ * It takes the time of cbvh_robot_pairs_in_contact, and of a distance or a depth for each pair that is near.
+ * CBVH_INVALID_ARGUMENT if the margin is negative or not finite, or if a file in question was baked without topology. */
+cbvh_status cbvh_robot_near_pairs(cbvh_robot robot, const double *joints, size_t joint_count, size_t count, double margin,
+                                  const cbvh_penetration_options *options, size_t *counts, cbvh_robot_near_pair *pairs,
+                                  double *gradients, size_t capacity, size_t *pair_count);
 /* Lists the bodies that are inside others without touching them, each as `a` with the body around it as `b`, configuration
  * after configuration. Other questions do not find them, because a mesh is its surface. A body counts if a connected part
  * of it is inside a mesh of the other one. A mesh that is not closed has nothing inside. CBVH_INVALID_ARGUMENT if a file in

@@ -1354,6 +1354,14 @@ public:
                 return cbvh_scene_pairs_within(raw(), d, pairs, capacity, count);
             });
     }
+    /// The pairs that overlap or are at most `margin` apart, with their signed distances: see cbvh_scene_near_pairs.
+    std::vector<cbvh_scene_near_pair> near_pairs(double margin, const PenetrationOptions &options = {}) {
+        const cbvh_penetration_options raw_options = options.raw();
+        return detail::list<cbvh_scene_near_pair>(
+            room_, [&](cbvh_scene_near_pair *pairs, std::size_t capacity, std::size_t *count) {
+                return cbvh_scene_near_pairs(raw(), margin, &raw_options, pairs, capacity, count);
+            });
+    }
     std::vector<cbvh_scene_relation> relations() {
         return detail::list<cbvh_scene_relation>(
             room_, [&](cbvh_scene_relation *found, std::size_t capacity, std::size_t *count) {
@@ -1520,6 +1528,10 @@ public:
     struct Group {
         std::string name;
         std::vector<std::size_t> joints;
+    };
+    /// Two bodies that overlap or are near each other, and the derivative of `distance` by each joint value.
+    struct NearPair : cbvh_robot_near_pair {
+        std::vector<double> gradient;
     };
     /// A named configuration of a group.
     struct State {
@@ -1758,6 +1770,16 @@ public:
                 return cbvh_robot_signed_distances(raw(), rows.data(), width(rows), rows.count, &raw_options, answers);
             });
     }
+    /// The pairs that overlap or are at most `margin` apart, with derivatives: see cbvh_robot_near_pairs.
+    std::vector<NearPair> near_pairs(const Joints &joints, double margin, const PenetrationOptions &options = {}) const {
+        detail::Room room;
+        return near(room, joints.data(), joints.size(), 1, margin, options)[0];
+    }
+    std::vector<std::vector<NearPair>> near_pairs(const std::vector<Joints> &joints, double margin,
+                                                  const PenetrationOptions &options = {}) {
+        const Rows rows("joints", joints);
+        return near(room_, rows.data(), width(rows), rows.count, margin, options);
+    }
     std::vector<cbvh_body_pair> pairs_in_contact(const Joints &joints) const {
         return pairs_of(cbvh_robot_pairs_in_contact, joints);
     }
@@ -1907,6 +1929,25 @@ private:
             [&](std::size_t *each, cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
                 return ask(raw(), rows.data(), width(rows), rows.count, each, pairs, capacity, count);
             });
+    }
+    std::vector<std::vector<NearPair>> near(detail::Room &room, const double *joints, std::size_t width, std::size_t rows,
+                                            double margin, const PenetrationOptions &options) const {
+        const cbvh_penetration_options raw_options = options.raw();
+        std::vector<std::size_t> counts(rows);
+        std::vector<double> slopes;
+        const auto pairs = detail::list<cbvh_robot_near_pair>(
+            room, [&](cbvh_robot_near_pair *found, std::size_t capacity, std::size_t *count) {
+                slopes.resize(capacity * width);
+                return cbvh_robot_near_pairs(raw(), joints, width, rows, margin, &raw_options, counts.data(), found,
+                                             slopes.data(), capacity, count);
+            });
+        std::vector<NearPair> all;
+        all.reserve(pairs.size());
+        for (std::size_t k = 0; k < pairs.size(); k++) {
+            const auto first = slopes.begin() + static_cast<std::ptrdiff_t>(k * width);
+            all.push_back({pairs[k], {first, first + static_cast<std::ptrdiff_t>(width)}});
+        }
+        return detail::divided(all, counts);
     }
     detail::Room room_;
     Owned handle_;

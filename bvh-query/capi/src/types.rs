@@ -195,6 +195,7 @@ structures! {
     PairRow { a: Instance, b: Instance }
     SceneDistanceRow { pair: PairRow, nearest: DistanceRow, found: i32, reserved: i32 }
     SceneSignedDistanceRow { pair: PairRow, nearest: SignedDistanceRow, found: i32, reserved: i32 }
+    SceneNearPairRow { pair: PairRow, distance: f64, nearest: SignedDistanceRow }
     SceneRelationRow { pair: PairRow, relation: i32, reserved: i32 }
     SceneContactRow { pair: PairRow, contact: ContactRow }
     SceneClashRow { pair: PairRow, clash: ClashRow }
@@ -206,6 +207,7 @@ structures! {
     FrequentPairRow { pair: BodyPairRow, share: f64 }
     RobotDistanceRow { pair: BodyPairRow, nearest: DistanceRow, found: i32, reserved: i32 }
     RobotSignedDistanceRow { pair: BodyPairRow, nearest: SignedDistanceRow, found: i32, reserved: i32 }
+    RobotNearPairRow { pair: BodyPairRow, distance: f64, nearest: SignedDistanceRow }
     RobotMotionRow {
         outcome: i32,
         reserved: i32,
@@ -384,6 +386,7 @@ row!(of: SceneContact { pair, contact } => SceneContactRow {});
 row!(of: SceneClash { pair, clash } => SceneClashRow {});
 row!(of: SceneDistance { pair, nearest } => SceneDistanceRow { found: 1, reserved: 0 });
 row!(of: SceneSignedDistance { pair, nearest } => SceneSignedDistanceRow { found: 1, reserved: 0 });
+row!(of: SceneSignedDistance { pair, nearest } => SceneNearPairRow { distance: of.nearest.distance });
 row!(of: Distance { distance, lower, upper, point_a, point_b, object_a, triangle_a, object_b, triangle_b }
     => DistanceRow {});
 row!(of: Separation { lower, upper, translation } => SeparationRow {});

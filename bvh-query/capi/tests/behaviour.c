@@ -569,7 +569,9 @@ static void signed_distances_of_scenes(int32_t parallel, int32_t tracking) {
     /* Of all pairs of several meshes it is the least. */
     const cbvh_mesh meshes[4] = {one, pair, open, large};
     random_source source = {13};
-    int deep = 0;
+    cbvh_scene_near_pair near[6];
+    size_t near_count;
+    int deep = 0, some_are_near = 0;
     for (int round = 0; round < 20; round++) {
         cbvh_pose worlds[4], pose;
         cbvh_instance instances[4];
@@ -581,21 +583,31 @@ static void signed_distances_of_scenes(int32_t parallel, int32_t tracking) {
             OK(cbvh_scene_add(scene, meshes[k], &worlds[k], NULL, &instances[k]));
         }
         OK(cbvh_scene_signed_distance(scene, NULL, &answer));
+        /* Those that are near are in the order of their instances. */
+        OK(cbvh_scene_near_pairs(scene, 0.5, NULL, near, 6, &near_count));
         double least = INFINITY;
-        for (int k = 0; k < 4; k++) {
-            for (int j = 0; j < k; j++) {
+        size_t listed = 0;
+        for (int j = 0; j < 4; j++) {
+            for (int k = j + 1; k < 4; k++) {
                 OK(cbvh_pose_relative(&worlds[j], &worlds[k], &pose));
                 OK(cbvh_signed_distances(querier, meshes[j], meshes[k], &pose, 1, NULL, &number));
                 least = fmin(least, number.lower);
+                if (number.upper <= 0.5) {
+                    CHECK(near[listed].pair.a.id == instances[j].id && near[listed].pair.b.id == instances[k].id);
+                    CHECK(memcmp(&number, &near[listed].nearest, sizeof number) == 0);
+                    CHECK(number.lower <= near[listed].distance && near[listed].distance <= number.upper);
+                    listed++;
+                }
                 CHECK(answer.pair.a.id != instances[j].id || answer.pair.b.id != instances[k].id ||
                       memcmp(&number, &answer.nearest, sizeof number) == 0);
             }
         }
-        CHECK(answer.nearest.lower == least);
+        CHECK(answer.nearest.lower == least && listed == near_count);
+        some_are_near += listed > 0 && listed < 6;
         deep += least < 0;
         OK(cbvh_scene_free(scene));
     }
-    CHECK(deep > 0 && deep < 20);
+    CHECK(deep > 0 && deep < 20 && some_are_near > 5);
     OK(cbvh_mesh_free(one));
     OK(cbvh_mesh_free(pair));
     OK(cbvh_mesh_free(open));

@@ -132,6 +132,7 @@ static void *ask(void *parallel) {
         OK(cbvh_first_hits(querier, other, NULL, &ray, 1, &hit));
         OK(cbvh_scene_distance(scene, &nearest));
         OK(cbvh_scene_signed_distance(scene, NULL, &least));
+        (void)cbvh_scene_near_pairs(scene, 1, NULL, NULL, 0, &count);
         OK(cbvh_scene_motion(scene, &instance, &path, 1, NULL, &motion));
         OK(cbvh_scene_is_free(scene, &instance, &path, 1, NULL, answer));
     }
@@ -173,6 +174,7 @@ static void *ask(void *parallel) {
     OK(cbvh_robot_add_obstacle(robot, "obstacle", other, &near, NULL));
     OK(cbvh_robot_distances(robot, zeros, 4, 2, near_robot));
     OK(cbvh_robot_signed_distances(robot, zeros, 4, 2, NULL, deep_robot));
+    (void)cbvh_robot_near_pairs(robot, zeros, 4, 2, 1, NULL, NULL, NULL, NULL, 0, &count);
     OK(cbvh_robot_edge_motions(robot, zeros, ends, 4, 1, NULL, &motion_of_robot));
     OK(cbvh_robot_free(robot));
     OK(cbvh_mesh_free(cylinder));

@@ -595,16 +595,26 @@ static void scenes(void) {
     FAILS(cbvh_scene_find(scene, "two", &found), CBVH_NOT_FOUND,
           "name: expected the name of an instance, found \"two\"");
     cbvh_scene_signed_distance_answer number;
+    size_t near_count;
     const double wrong[] = {NAN, -1, INFINITY, -0x1p-1074};
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
         const cbvh_penetration_options gap = {.size = sizeof gap, .relative_gap = wrong[k]},
                                        tolerance = {.size = sizeof tolerance, .tolerance = wrong[k]};
         FAILS(cbvh_scene_signed_distance(scene, &gap, &number), CBVH_INVALID_ARGUMENT, "relative_gap: expected");
         FAILS(cbvh_scene_signed_distance(scene, &tolerance, &number), CBVH_INVALID_ARGUMENT, "tolerance: expected");
+        FAILS(cbvh_scene_near_pairs(scene, 1, &gap, NULL, 0, &near_count), CBVH_INVALID_ARGUMENT, "relative_gap: expected");
     }
     const cbvh_penetration_options cut = {.size = 12};
     const cbvh_scene no_scene = {0};
     FAILS(cbvh_scene_signed_distance(scene, &cut, &number), CBVH_INVALID_ARGUMENT, "options.size: expected 24");
+    const double margins[] = {NAN, INFINITY, -1};
+    for (size_t k = 0; k < 3; k++) {
+        FAILS(cbvh_scene_near_pairs(scene, margins[k], NULL, NULL, 0, &near_count), CBVH_INVALID_ARGUMENT,
+              "margin: expected a finite distance of at least 0");
+    }
+    FAILS(cbvh_scene_near_pairs(scene, 1, NULL, NULL, 1, &near_count), CBVH_INVALID_ARGUMENT, "pairs: expected a pointer");
+    FAILS(cbvh_scene_near_pairs(scene, 1, NULL, NULL, 0, NULL), CBVH_INVALID_ARGUMENT, "count: expected a pointer");
+    FAILS(cbvh_scene_near_pairs(no_scene, 1, NULL, NULL, 0, &near_count), CBVH_INVALID_HANDLE, "scene: ");
     FAILS(cbvh_scene_signed_distance(scene, NULL, NULL), CBVH_INVALID_ARGUMENT, "answer: expected a pointer, found NULL");
     FAILS(cbvh_scene_signed_distance(no_scene, NULL, &number), CBVH_INVALID_HANDLE, "scene: ");
     cbvh_motion_answer answer;

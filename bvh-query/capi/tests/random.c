@@ -233,7 +233,9 @@ int main(int argument_count, char **arguments) {
         case 49: status = cbvh_scene_instances(s, out, capacity, &count); break;
         case 50: status = cbvh_scene_pairs_within(s, x, out, capacity, &count); break;
         case 51: status = cbvh_scene_contacts(s, out, capacity, &count); break;
-        case 52: status = below(2) ? cbvh_scene_distance(s, out) : cbvh_scene_signed_distance(s, options, out); break;
+        case 52: status = below(2) ? cbvh_scene_distance(s, out)
+                          : below(2) ? cbvh_scene_signed_distance(s, options, out)
+                                     : cbvh_scene_near_pairs(s, x, options, out, capacity, &count); break;
         case 53: status = cbvh_scene_motion(s, instances, paths, below(3), options, out); break;
         case 54: status = cbvh_scene_first_hits(s, in, n, out); break;
         case 55: status = cbvh_scene_signed_point_distances(s, in, n, x, out); break;
@@ -296,8 +298,10 @@ int main(int argument_count, char **arguments) {
         case 107: status = cbvh_robot_allow_frequent(o, below(4), x, out, capacity, &count); break;
         case 108: status = below(2) ? cbvh_robot_collide(o, in, joint_count, n, out)
                                     : cbvh_robot_distances(o, in, joint_count, n, out); break;
-        case 109: status = cbvh_robot_pairs_in_contact(o, in, joint_count, n, below(2) ? NULL : counts, out, capacity,
-            &count); break;
+        case 109: status = below(2) ? cbvh_robot_pairs_in_contact(o, in, joint_count, n, below(2) ? NULL : counts, out, capacity,
+                                                                  &count)
+                                    : cbvh_robot_near_pairs(o, in, joint_count, n, x, options, below(2) ? NULL : counts, out,
+                                                            below(2) ? NULL : more, capacity, &count); break;
         case 110: status = below(2) ? cbvh_robot_link_poses(o, in, joint_count, n, out, capacity, &count)
                                     : cbvh_robot_signed_distances(o, in, joint_count, n, options, out); break;
         case 111: status = below(2) ? cbvh_robot_edges_are_free(o, in, more, joint_count, n, options, out)

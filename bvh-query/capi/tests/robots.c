@@ -293,6 +293,68 @@ static void configurations(int32_t parallel) {
     OK(cbvh_robot_free(robot));
 }
 
+/* Pairs that are near: those of a querier, with derivatives that are those of differences. */
+static void near_pairs(int32_t parallel) {
+    enum { FEW = 60, MOST = FEW * PAIRS };
+    const cbvh_robot robot = cell();
+    const double margin = 0.1;
+    static double joints[FEW * JOINTS], slopes[MOST * JOINTS], few_slopes[JOINTS];
+    static cbvh_robot_near_pair pairs[MOST], others[MOST];
+    static cbvh_robot_signed_distance_answer least[FEW];
+    size_t counts[FEW], count, few, place = 0, compared = 0, overlapping = 0;
+    OK(cbvh_robot_set_parallel(robot, parallel));
+    /* Other tests have the configurations that they would have without this one. */
+    const random_source before = source;
+    random_joints(joints, FEW);
+    source = before;
+    OK(cbvh_robot_near_pairs(robot, joints, JOINTS, FEW, margin, NULL, counts, pairs, slopes, MOST, &count));
+    OK(cbvh_robot_signed_distances(robot, joints, JOINTS, FEW, NULL, least));
+    for (size_t row = 0; row < FEW; row++) {
+        double lowest = INFINITY;
+        for (size_t k = place; k < place + counts[row]; k++) {
+            const cbvh_signed_distance *const of = &pairs[k].nearest;
+            lowest = fmin(lowest, of->lower);
+            CHECK(of->lower <= pairs[k].distance && pairs[k].distance <= of->upper && of->lower <= margin);
+            overlapping += of->lower < 0;
+        }
+        /* The least one is among them, unless it is farther. */
+        CHECK(counts[row] == 0 ? least[row].nearest.lower > margin : lowest == least[row].nearest.lower);
+        /* One alone has the same answer. */
+        OK(cbvh_robot_near_pairs(robot, &joints[row * JOINTS], JOINTS, 1, margin, NULL, NULL, others, NULL, MOST, &few));
+        CHECK(few == counts[row] && memcmp(others, &pairs[place], few * sizeof *others) == 0);
+        for (size_t number = 0; counts[row] > 0 && number < JOINTS; number++) {
+            double ends[2], moved[JOINTS];
+            for (int side = 0; side < 2; side++) {
+                memcpy(moved, &joints[row * JOINTS], sizeof moved);
+                moved[number] += side == 0 ? -1e-6 : 1e-6;
+                OK(cbvh_robot_near_pairs(robot, moved, JOINTS, 1, 2 * margin, NULL, NULL, others, NULL, MOST, &few));
+                size_t same = 0;
+                while (others[same].pair.a.id != pairs[place].pair.a.id || others[same].pair.b.id != pairs[place].pair.b.id) {
+                    same++;
+                }
+                ends[side] = others[same].distance;
+            }
+            /* Searches for depths may end elsewhere, and nearest points may jump. */
+            if (pairs[place].distance > 1e-3 && fabs(ends[0] - 2 * pairs[place].distance + ends[1]) < 1e-10) {
+                CHECK(fabs(slopes[place * JOINTS + number] - (ends[1] - ends[0]) / 2e-6) < 1e-6);
+                compared++;
+            }
+        }
+        place += counts[row];
+    }
+    CHECK(place == count && count > 30 && compared > 80 && overlapping > 5);
+    /* Too little room: as much as there is of it is used. */
+    others[0] = others[1] = pairs[2];
+    FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, FEW, margin, NULL, NULL, others, few_slopes, 1, &few),
+          CBVH_BUFFER_TOO_SMALL, "pairs: expected room for");
+    CHECK(few == count && memcmp(&others[0], &pairs[0], sizeof *pairs) == 0 && memcmp(few_slopes, slopes, sizeof few_slopes) == 0);
+    CHECK(memcmp(&others[1], &pairs[2], sizeof *pairs) == 0);
+    /* None at all. */
+    OK(cbvh_robot_near_pairs(robot, NULL, JOINTS, 0, margin, NULL, NULL, NULL, NULL, 0, &few));
+    CHECK(few == 0);
+    OK(cbvh_robot_free(robot));
+}
+
 /* Samples of motions, and motions on polynomials. */
 static void motions(int32_t parallel) {
     enum { EDGES = 40, SAMPLES = 200 };
@@ -603,6 +665,7 @@ static void misuse(void) {
     cbvh_pose pose = CBVH_IDENTITY;
     cbvh_robot_distance_answer nearest[3];
     cbvh_robot_signed_distance_answer numbers[3];
+    static cbvh_robot_near_pair near[9];
     cbvh_robot_motion_answer motion[3];
     cbvh_robot_counts sizes;
     cbvh_frequent_pair pairs_of_many[1];
@@ -720,6 +783,8 @@ static void misuse(void) {
         FAILS(cbvh_robot_distances(robot, joints, JOINTS, 3, nearest), CBVH_INVALID_ARGUMENT, message);
         FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, NULL, numbers), CBVH_INVALID_ARGUMENT, message);
         FAILS(cbvh_robot_pairs_in_contact(robot, joints, JOINTS, 3, counts, pairs, 9, &count), CBVH_INVALID_ARGUMENT, message);
+        FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, 3, 1, NULL, counts, near, room, 9, &count), CBVH_INVALID_ARGUMENT,
+              message);
         FAILS(cbvh_robot_link_poses(robot, joints, JOINTS, 3, NULL, 0, &count), CBVH_INVALID_ARGUMENT, message);
         joints[2 * JOINTS + 1] = 0;
         room[2 * JOINTS] = INFINITY;
@@ -740,7 +805,22 @@ static void misuse(void) {
                   "relative_gap: expected");
             FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, &tolerance, numbers), CBVH_INVALID_ARGUMENT,
                   "tolerance: expected");
+            FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, k, margins[k], NULL, counts, near, room, 9, &count),
+                  CBVH_INVALID_ARGUMENT, "margin: expected a finite distance of at least 0");
+            FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, 3, 1, &gap, counts, near, room, 9, &count),
+                  CBVH_INVALID_ARGUMENT, "relative_gap: expected");
         }
+        FAILS(cbvh_robot_near_pairs(none, joints, JOINTS, 3, 1, NULL, counts, near, room, 9, &count), CBVH_INVALID_HANDLE,
+              "robot: ");
+        FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, 3, 1, NULL, counts, NULL, room, 9, &count), CBVH_INVALID_ARGUMENT,
+              "pairs: expected a pointer");
+        FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, 3, 1, NULL, counts, near, room, 9, NULL), CBVH_INVALID_ARGUMENT,
+              "count: expected a pointer");
+        FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, 3, 1, NULL, counts, near, (double *)(void *)((char *)room + 1), 9,
+                                    &count),
+              CBVH_INVALID_ARGUMENT, "gradients: expected an address");
+        FAILS(cbvh_robot_near_pairs(robot, joints, JOINTS, 3, 1, NULL, counts, near, room, SIZE_MAX, &count),
+              CBVH_INVALID_ARGUMENT, "expected at most");
         const cbvh_penetration_options cut = {.size = 12};
         FAILS(cbvh_robot_signed_distances(robot, joints, JOINTS, 3, &cut, numbers), CBVH_INVALID_ARGUMENT,
               "options.size: expected 24");
@@ -816,6 +896,7 @@ int main(int count, char **arguments) {
     description();
     for (int32_t parallel = 0; parallel < 2; parallel++) {
         configurations(parallel);
+        near_pairs(parallel);
         motions(parallel);
         insides(parallel);
     }

@@ -1,6 +1,7 @@
 // The C++ header: handles that are freed once, copies, moves, exceptions, matrices of other libraries, and answers.
 #include <cbvh.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -216,6 +217,9 @@ void overlaps() {
     CHECK(deepest->nearest.lower <= -0.25 && deepest->nearest.upper >= -0.25 && deepest->nearest.is_signed);
     CHECK(scene.signed_distance({0, 0.1})->nearest.upper < -0.1 && !cbvh::Scene().signed_distance());
     FAILS(scene.signed_distance({-1}), CBVH_INVALID_ARGUMENT, "relative_gap: ");
+    const auto close = scene.near_pairs(0);
+    CHECK(!close.empty() && close[0].pair.a == deepest->pair.a && close[0].distance == deepest->nearest.lower);
+    FAILS(scene.near_pairs(-1), CBVH_INVALID_ARGUMENT, "margin: ");
     const auto clashes = scene.clashes(near);
     CHECK(clashes.size() == 1 && clashes[0].clash.kind == CBVH_CLASH_OVERLAPPING && scene.clashes().size() == 1);
     FAILS(scene.clashes({0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
@@ -478,6 +482,16 @@ void robots(const std::string &urdf) {
         CHECK(std::abs(numbers[0]->nearest.upper - distances[0]->nearest.distance) < 1e-12);
         CHECK(robot.signed_distance(forward)->nearest.lower == numbers[1]->nearest.lower && numbers[1]->pair.b == box);
         FAILS(robot.signed_distance(up, {0, -1}), CBVH_INVALID_ARGUMENT, "tolerance: ");
+        const auto near = robot.near_pairs(both, 0.3);
+        CHECK(near.size() == 2 && near[1].size() >= 1 && near[1][0].gradient.size() == forward.size());
+        const auto deepest = std::min_element(near[1].begin(), near[1].end(), [](const cbvh::Robot::NearPair &a, const cbvh::Robot::NearPair &b) {
+            return a.nearest.lower < b.nearest.lower;
+        });
+        CHECK(deepest->pair.b == box && deepest->distance == numbers[1]->nearest.lower);
+        const auto alone = robot.near_pairs(forward, 0.3);
+        CHECK(alone.size() == near[1].size() && alone[0].gradient == near[1][0].gradient);
+        CHECK(robot.near_pairs(std::vector<Joints>(), 1).empty());
+        FAILS(robot.near_pairs(up, -1), CBVH_INVALID_ARGUMENT, "margin: ");
         const auto pairs = robot.pairs_in_contact(both);
         CHECK(pairs[0].empty() && !pairs[1].empty() && pairs[1].size() == robot.pairs_in_contact(forward).size());
         CHECK(robot.link_poses(both)[1][4].rows[3] == robot.link_poses(forward)[4].rows[3] && robot.link_poses(up).size() == 5);

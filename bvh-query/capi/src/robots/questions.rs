@@ -7,10 +7,10 @@ use crate::output::{List, Lists, Room};
 use crate::status::Failure;
 use crate::types::{
     BodyPairRow, FREE, HIT, MotionChoices, NEAR, PenetrationChoices, PoseRows, RobotDistanceRow, RobotHandle,
-    RobotMotionRow, RobotSignedDistanceRow,
+    RobotMotionRow, RobotNearPairRow, RobotSignedDistanceRow,
 };
-use bvh_query::MotionOptions;
-use cbvh_robot::{Edge, Robot, RobotDistance, RobotError, RobotMotion, RobotSignedDistance};
+use bvh_query::{MotionOptions, NumberError, QueryError};
+use cbvh_robot::{Edge, NearPair, Robot, RobotDistance, RobotError, RobotMotion, RobotSignedDistance};
 
 /// Configurations, or other rows of numbers that a robot is asked about.
 struct Rows {
@@ -260,6 +260,53 @@ pub unsafe extern "C" fn cbvh_robot_pairs_inside(
             |robot, joints| robot.pairs_inside_many(joints),
         )
     }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cbvh_robot_near_pairs(
+    robot: RobotHandle,
+    joints: *const f64,
+    joint_count: usize,
+    count: usize,
+    margin: f64,
+    options: *const PenetrationChoices,
+    counts: *mut usize,
+    pairs: *mut RobotNearPairRow,
+    gradients: *mut f64,
+    capacity: usize,
+    pair_count: *mut usize,
+) -> i32 {
+    // SAFETY: the header asks for it.
+    entry(|| unsafe {
+        let options = input::options("options", options)?.read();
+        // No configuration is to blame for them.
+        options.check()?;
+        if !(0.0..f64::INFINITY).contains(&margin) {
+            return Err(QueryError::from(NumberError::Margin(margin)).into());
+        }
+        let room = || {
+            let lists = Lists::new(("pairs", pairs, capacity, pair_count), counts, count)?;
+            let slopes = if gradients.is_null() { 0 } else { capacity.saturating_mul(joint_count) };
+            Ok((lists, Room::new("gradients", gradients, slopes)?))
+        };
+        configurations(robot, joints, joint_count, count).ask(
+            room,
+            |robot, joints| robot.near_pairs(joints, margin, &options),
+            |robot, joints| robot.near_pairs_many(joints, margin, &options),
+            |(lists, mut slopes), own, found| {
+                let all = found.iter().flatten().flat_map(|pair| &pair.gradient);
+                all.enumerate().for_each(|(place, slope)| slopes.set(place, *slope));
+                let rows =
+                    |pairs: Vec<NearPair>| Ok(pairs.into_iter().map(|pair| near(own, &pair)).collect());
+                lists.finish_with::<RobotNearPairRow, Failure>(found.into_iter().map(rows))
+            },
+        )
+    })
+}
+
+fn near(robot: &Robot, of: &NearPair) -> RobotNearPairRow {
+    let distance = of.nearest.distance;
+    RobotNearPairRow { pair: numbered(robot, &of.bodies), distance, nearest: of.nearest.into() }
 }
 
 #[unsafe(no_mangle)]

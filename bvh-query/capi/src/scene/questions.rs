@@ -8,8 +8,8 @@ use crate::paths::AskedPath;
 use crate::status::Failure;
 use crate::types::{
     ClashChoices, Instance, MotionChoices, MotionRow, PairRow, PathHandle, PenetrationChoices, SceneClashRow,
-    SceneContactRow, SceneDistanceRow, SceneHandle, SceneMeasuredClashRow, SceneRelationRow,
-    SceneSignedDistanceRow,
+    SceneContactRow, SceneDistanceRow, SceneHandle, SceneMeasuredClashRow, SceneNearPairRow,
+    SceneRelationRow, SceneSignedDistanceRow,
 };
 use bvh_query::{InstanceId, MotionOptions, RigidPath, Scene, SceneError};
 
@@ -22,6 +22,8 @@ about! {
         scene.signed_distance(&input::options("options", options)?.read())?.into();
     list cbvh_scene_pairs_in_contact() -> pairs: PairRow = scene.pairs_in_contact()?;
     list cbvh_scene_pairs_within(d: f64,) -> pairs: PairRow = scene.pairs_within(d)?;
+    list cbvh_scene_near_pairs(margin: f64, options: *const PenetrationChoices,) -> pairs: SceneNearPairRow =
+        scene.near_pairs(margin, &input::options("options", options)?.read())?;
     list cbvh_scene_relations() -> relations: SceneRelationRow = scene.relations()?;
     list cbvh_scene_contacts() -> contacts: SceneContactRow = scene.contacts()?;
     list cbvh_scene_clashes(options: *const ClashChoices,) -> clashes: SceneClashRow =
