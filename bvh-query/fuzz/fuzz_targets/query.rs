@@ -44,7 +44,9 @@ fuzz_target!(|bytes: &[u8]| {
         querier.set_budget(1 << 16);
         let _ = querier.intersection(&a, &b, &pose);
         let _ = querier.intersection_surface(&a, &b, &pose);
-        let _ = querier.signed_distance(&a, &b, &pose, &PenetrationOptions::new().tolerance(allowed));
+        let options = PenetrationOptions::new().tolerance(allowed);
+        let _ = querier.signed_distance(&a, &b, &pose, &options);
+        let _ = querier.signed_distance_within(&a, &b, &pose, near, &options);
         querier.set_budget(u64::MAX);
         let (shape, point, away) = (a.all().at(&pose), [near, 0.0, allowed], pose.translation());
         let _ = (querier.closest_point(shape, point, f64::INFINITY), querier.side(shape, point));
