@@ -31,6 +31,11 @@ impl Edge {
         Self { coefficients }
     }
 
+    /// Returns the joint values at time 0 and at time 1.
+    pub fn ends(&self) -> [Vec<f64>; 2] {
+        [0.0, 1.0].map(|t| self.coefficients.iter().map(|of| value(of, t)).collect())
+    }
+
     /// Returns bounds of a joint value on the whole way.
     fn bounds(&self, number: usize) -> Bounds {
         let of = &self.coefficients[number];

@@ -7,7 +7,8 @@
 //!                                                  ├──> questions about configurations (questions, asker, rod)
 //!                                                  ├──> pairs that are near, with derivatives (near_pairs)
 //!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns)
-//!                                                  └──> plain data, and back (parts)
+//!                                                  ├──> plain data, and back (parts)
+//!                                                  └──> what programs draw (tree)
 //! ```
 //!
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
@@ -36,6 +37,7 @@ mod source;
 mod srdf;
 #[cfg(test)]
 mod testing;
+mod tree;
 mod turns;
 mod urdf;
 mod xml;
@@ -50,6 +52,7 @@ pub use parts::{OtherBody, RobotParts};
 pub use questions::{RobotDistance, RobotSignedDistance};
 pub use robot::Robot;
 pub use srdf::{Group, State};
+pub use tree::{JointKind, RobotTree, TreeJoint, TreeShape};
 
 /// Compiles the example of the crate's README.
 #[cfg(doctest)]

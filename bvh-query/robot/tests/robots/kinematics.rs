@@ -3,19 +3,19 @@
 use cbvh_robot::{Base, Robot, RobotOptions};
 use std::path::Path;
 
-type Matrix = [[f64; 4]; 4];
+pub(crate) type Matrix = [[f64; 4]; 4];
 
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
+pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
     let at = |i: usize, j: usize| (0..4).map(|k| a[i][k] * b[k][j]).sum();
     [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| at(i, j)))
 }
 
-fn shift([x, y, z]: [f64; 3]) -> Matrix {
+pub(crate) fn shift([x, y, z]: [f64; 3]) -> Matrix {
     [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]]
 }
 
 /// The exponential of a rotation vector, summed term by term.
-fn turn([x, y, z]: [f64; 3], angle: f64) -> Matrix {
+pub(crate) fn turn([x, y, z]: [f64; 3], angle: f64) -> Matrix {
     let cross = [[0.0, -z, y, 0.0], [z, 0.0, -x, 0.0], [-y, x, 0.0, 0.0], [0.0; 4]];
     let (mut sum, mut term) = (shift([0.0; 3]), shift([0.0; 3]));
     for step in 1..60 {
@@ -25,7 +25,7 @@ fn turn([x, y, z]: [f64; 3], angle: f64) -> Matrix {
     sum
 }
 
-fn read(text: &str, base: Base) -> Robot {
+pub(crate) fn read(text: &str, base: Base) -> Robot {
     let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
@@ -43,7 +43,7 @@ fn check(robot: &Robot, joints: &[f64], link: &str, expected: &Matrix) {
     }
 }
 
-const ALL_KINDS: &str = r#"<robot name="all">
+pub(crate) const ALL_KINDS: &str = r#"<robot name="all">
   <link name="root"/><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/><link name="f"/>
   <joint name="turn" type="revolute">
     <parent link="root"/><child link="a"/><origin xyz="1 2 3" rpy="0.3 -0.4 0.5"/><axis xyz="0 3 4"/>

@@ -40,7 +40,7 @@ fn described(folder: &Path) -> Robot {
 }
 
 /// The arm after all kinds of changes.
-fn changed() -> Robot {
+pub(crate) fn changed() -> Robot {
     let folder = cbvh_testkit::folder();
     let mut robot = described(folder.path());
     robot.add_obstacle("gone", block([1.0; 3]), &Pose::IDENTITY).unwrap();
