@@ -52,6 +52,14 @@ pub(crate) enum Show {
     },
     /// Instances in the world, and which of them clash.
     Clash { instances: Vec<Instance>, clashes: Vec<Found> },
+    /// A robot: shapes where joint values put them, and lines of a file with such values.
+    Robot {
+        instances: Vec<Carried>,
+        allowed: Vec<[usize; 2]>,
+        joints: Vec<Joint>,
+        values: Vec<Value>,
+        lines: Vec<Line>,
+    },
 }
 
 /// A shape in the world.
@@ -70,6 +78,73 @@ pub(crate) struct Instance {
     pub(crate) member: u32,
     /// The groups that it meets.
     pub(crate) meets: u32,
+}
+
+/// A shape that a joint of a robot carries. Shapes of one body have one name.
+#[derive(Debug, Serialize)]
+pub(crate) struct Carried {
+    #[serde(flatten)]
+    pub(crate) instance: Instance,
+    /// The frame that carries it: 0 is the world, and each joint moves the next one.
+    pub(crate) frame: usize,
+    /// Where it is in that frame.
+    #[serde(serialize_with = "one_pose")]
+    pub(crate) origin: Pose,
+}
+
+/// A joint of a robot.
+#[derive(Debug, Serialize)]
+pub(crate) struct Joint {
+    pub(crate) kind: &'static str,
+    /// The frame that it hangs from, and where it is there.
+    pub(crate) parent: usize,
+    #[serde(serialize_with = "one_pose")]
+    pub(crate) origin: Pose,
+    pub(crate) axis: [f64; 3],
+    /// The place of its value, or of the first of them, and by what that is multiplied and moved.
+    pub(crate) value: usize,
+    pub(crate) factor: f64,
+    pub(crate) offset: f64,
+}
+
+/// A joint value.
+#[derive(Debug, Serialize)]
+pub(crate) struct Value {
+    pub(crate) name: String,
+    /// What it is in the poses of the instances.
+    pub(crate) at: f64,
+    /// The ends of its slider. None leaves the choice to the page, which knows how large the robot is.
+    pub(crate) lower: Option<f64>,
+    pub(crate) upper: Option<f64>,
+}
+
+/// A configuration or, with a goal, an edge.
+#[derive(Debug, Serialize)]
+pub(crate) struct Line {
+    pub(crate) start: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) goal: Option<Vec<f64>>,
+    /// Where the edge ends before its goal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) end: Option<End>,
+}
+
+impl Line {
+    /// Returns how many joint values it has.
+    pub(crate) fn numbers(&self) -> u64 {
+        (self.start.len() + self.goal.as_ref().map_or(0, Vec::len)) as u64
+    }
+}
+
+/// The first hit of an edge, or where it is undecided.
+#[derive(Debug, Serialize)]
+pub(crate) struct End {
+    pub(crate) hit: bool,
+    pub(crate) free_until: f64,
+    pub(crate) at: f64,
+    pub(crate) bodies: [String; 2],
+    /// The nearest points of both, in the world.
+    pub(crate) points: [[f64; 3]; 2],
 }
 
 /// The poses of all moving instances, in the order of the instances.

@@ -2,6 +2,7 @@
 
 use crate::MAX_FILE_BYTES;
 use bvh_query::{PoseError, QueryError, SceneError};
+use cbvh_robot::RobotError;
 
 /// Why a page cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -64,4 +65,7 @@ pub enum PageError {
     /// An instance is not in its scene.
     #[error(transparent)]
     NotInScene(#[from] SceneError),
+    /// A configuration is not one of the robot, or puts a link too far away.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
 }

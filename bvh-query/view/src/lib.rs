@@ -1,4 +1,4 @@
-//! Self-contained HTML pages that show meshes, motions, scenes and clashes, and ask cbvh about them in the browser.
+//! Self-contained HTML pages that show meshes, motions, scenes, clashes and robots, and ask cbvh about them in the browser.
 //!
 //! A page is one file. It needs no network and no server, and opens from a disk. It holds the files that it shows, the program
 //! that draws them, and the query library itself as WebAssembly, so that what it answers is what the library answers.
@@ -6,7 +6,7 @@
 //! ```text
 //! page.html (TypeScript and WebAssembly, built in bvh-query/web) ──┐
 //! shapes ──> files, each once (files) ────────────────────────────┼──> page ──> any writer
-//! poses, motions, scenes, clashes ──> JSON (content, json) ────────┘
+//! poses, motions, scenes, clashes, robots ──> JSON (content, json) ┘
 //! ```
 //!
 //! [`Page`] has an example. The command `cbvh view` and the method `Mesh.view` of the Python module make such pages.
@@ -17,11 +17,13 @@ mod error;
 mod files;
 mod json;
 mod page;
+mod robot;
 mod scene;
 
 pub use error::PageError;
 pub use files::Named;
 pub use page::{Page, Placed, PlacedClash};
+pub use robot::RobotLine;
 pub use scene::Frames;
 
 /// The most bytes of a file in a page. A browser holds the packed text of a file as one string, of at most 2^29 - 24 characters

@@ -3,7 +3,7 @@
 //! The template has one line that the content replaces. A file is compressed and encoded as text while it is written, so
 //! that no copy of it is made in memory.
 
-use crate::content::{Content, Found, Frame, Instance, Show, VERSION};
+use crate::content::{Content, Found, Frame, Instance, Line, Show, VERSION};
 use crate::files::{Files, Named, Part};
 use crate::{PageError, json};
 use base64::engine::general_purpose::STANDARD;
@@ -17,9 +17,6 @@ use std::io::{self, BufWriter, Write};
 pub(crate) const TEMPLATE: &str = include_str!("../page.html");
 /// The line of the template that the content replaces.
 pub(crate) const CONTENT_LINE: &str = "<!--cbvh:content-->";
-
-/// The bytes of a pose in memory, by which frames count.
-const POSE_BYTES: u64 = size_of::<[f64; 12]>() as u64;
 
 /// A page that shows meshes.
 ///
@@ -41,10 +38,10 @@ const POSE_BYTES: u64 = size_of::<[f64; 12]>() as u64;
 /// ```
 #[derive(Debug)]
 pub struct Page {
-    files: Files,
+    pub(crate) files: Files,
     /// Which part of each file is shown, where the files themselves are shown. Instances say it of themselves.
-    parts: Vec<Part>,
-    show: Show,
+    pub(crate) parts: Vec<Part>,
+    pub(crate) show: Show,
 }
 
 /// A shape in the world.
@@ -198,11 +195,14 @@ impl Page {
         Ok(Self { files, parts: Vec::new(), show: Show::Clash { instances, clashes } })
     }
 
-    /// Returns how many bytes the files and the frames have before they are packed.
+    /// Returns how many bytes the files, and the numbers of frames or of a robot's lines, have before they are packed.
     pub fn bytes(&self) -> u64 {
-        let frames = if let Show::Scene { frames, .. } = &self.show { &frames[..] } else { &[] };
-        let poses: u64 = frames.iter().map(|frame| frame.0.len() as u64).sum();
-        self.files.bytes().saturating_add(poses.saturating_mul(POSE_BYTES))
+        let numbers: u64 = match &self.show {
+            Show::Scene { frames, .. } => frames.iter().map(|frame| 12 * frame.0.len() as u64).sum(),
+            Show::Robot { lines, .. } => lines.iter().map(Line::numbers).sum(),
+            _ => 0,
+        };
+        self.files.bytes().saturating_add(numbers.saturating_mul(size_of::<f64>() as u64))
     }
 
     /// Returns the page if its files and frames have at most so many bytes, before they are packed.
@@ -243,7 +243,9 @@ impl Page {
 }
 
 /// Finds the files of instances.
-fn instances(placed: impl IntoIterator<Item = Placed>) -> Result<(Files, Vec<Instance>), PageError> {
+pub(crate) fn instances(
+    placed: impl IntoIterator<Item = Placed>,
+) -> Result<(Files, Vec<Instance>), PageError> {
     let mut files = Files::default();
     let instances = placed.into_iter().map(|Placed { name, of, pose, margin, groups, moving }| {
         length("margin", margin)?;

@@ -5,7 +5,8 @@ use base64::engine::general_purpose::STANDARD;
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, shapes, to_bytes};
 use bvh_query::{Bvh, ClashClass, Groups, InstanceId, OwnedShape, Pose, Scene};
-use cbvh_view::{Frames, Named, Page, PageError, Placed, PlacedClash};
+use cbvh_robot::{Edge, Robot, RobotError, RobotMotion, RobotOptions};
+use cbvh_view::{Frames, Named, Page, PageError, Placed, PlacedClash, RobotLine};
 use serde_json::{Value, json};
 use std::io::{self, Read as _, Write};
 
@@ -318,6 +319,95 @@ fn clashes_have_what_is_known() {
     ] {
         assert!(matches!(refused(wrong), PageError::Number { .. }));
     }
+}
+
+/// The robot of the test data: four joints that turn.
+fn arm() -> Robot {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    Robot::from_urdf(path, &RobotOptions::default()).unwrap()
+}
+
+#[test]
+fn a_robot_stands_where_its_first_line_says() {
+    let mut robot = arm();
+    robot.allow("forearm", "hand").unwrap();
+    robot.add_obstacle("wall", block(), &shifted(9.0)).unwrap();
+    robot.add_obstacle("floor", block(), &shifted(-9.0)).unwrap();
+    robot.set_margin("wall", 0.25).unwrap();
+    let line = |start: &[f64]| RobotLine { start: start.to_vec(), edge: None };
+    let [first, second] = [[0.1, 0.2, -0.3, 0.4], [0.0, 3.0, 0.0, 0.0]];
+    let page = Page::of_robot(&mut robot, [line(&first), line(&second)]).unwrap();
+    let (content, files) = unpacked(&page);
+    let show = &content["show"];
+    // Both obstacles are one file.
+    assert_eq!((files.len(), &show["kind"]), (6, &json!("robot")));
+    assert_eq!(page.bytes(), files.iter().map(|file| file.len() as u64).sum::<u64>() + 8 * 8);
+    let of = |field: &str| {
+        show["instances"].as_array().unwrap().iter().map(|i| i[field].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(of("name"), ["base", "turret", "upper_arm", "forearm", "hand", "wall", "floor"]);
+    assert_eq!(of("frame"), [0, 1, 2, 3, 4, 0, 0]);
+    assert_eq!(of("moving"), [true, true, true, true, true, false, false]);
+    assert_eq!(of("margin"), [0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0]);
+    assert_eq!(
+        (&of("member")[4..6], &of("meets")[4..6]),
+        (&[json!(2), json!(1)][..], &[json!(3), json!(2)][..])
+    );
+    let rows = |pose: &Pose| {
+        let (r, t) = (pose.rotation(), pose.translation());
+        json!([0, 1, 2].map(|k| [r[k][0], r[k][1], r[k][2], t[k]]).concat())
+    };
+    let poses = robot.link_poses(&first).unwrap();
+    // The shape of the turret has an origin of its own.
+    for link in [0, 2, 3, 4] {
+        assert_eq!(of("pose")[link], rows(&poses[link]));
+    }
+    assert_eq!(of("pose")[5..], [rows(&shifted(9.0)), rows(&shifted(-9.0))]);
+    assert_eq!(show["allowed"], json!([[3, 4]]));
+    let elbow = &show["joints"][2];
+    let mut origin = IDENTITY;
+    origin[11] = 0.36;
+    let expected = json!({ "kind": "turn", "parent": 2, "origin": origin, "axis": [0.0, 1.0, 0.0], "value": 2, "factor": 1.0, "offset": 0.0 });
+    assert_eq!(*elbow, expected);
+    assert_eq!(show["values"][2], json!({ "name": "elbow", "at": -0.3, "lower": -2.8, "upper": 2.8 }));
+    assert_eq!(show["lines"], json!([{ "start": first }, { "start": second }]));
+
+    // Without a line, at 0.
+    let (content, _) = unpacked(&Page::of_robot(&mut robot, []).unwrap());
+    assert_eq!((&content["show"]["values"][2]["at"], &content["show"]["lines"]), (&json!(0.0), &json!([])));
+    for wrong in [line(&first[1..]), line(&[0.0, f64::NAN, 0.0, 0.0])] {
+        let refused = Page::of_robot(&mut robot, [line(&first), wrong]).unwrap_err();
+        assert!(
+            matches!(refused, PageError::Robot(RobotError::Count { .. } | RobotError::Value { .. })),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
+fn edges_of_a_robot_have_their_answers() {
+    let mut robot = arm();
+    for (a, b) in [("turret", "upper_arm"), ("upper_arm", "forearm"), ("forearm", "hand"), ("base", "turret")]
+    {
+        robot.allow(a, b).unwrap();
+    }
+    robot.add_obstacle("wall", block(), &shifted(1.5)).unwrap();
+    let ends = [[0.0; 4], [0.0, 1.5, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0]];
+    let mut ask =
+        |to: usize| robot.motion(&Edge::straight(&ends[0], &ends[to]).unwrap(), &Default::default()).unwrap();
+    let [hit, free] = [ask(1), ask(2)];
+    let line =
+        |to: usize, motion| RobotLine { start: ends[0].to_vec(), edge: Some((ends[to].to_vec(), motion)) };
+    let page = Page::of_robot(&mut robot, [line(1, &hit), line(2, &free)]).unwrap();
+    let (content, _) = unpacked(&page);
+    let lines = &content["show"]["lines"];
+    let RobotMotion::Hit { free_until, touching_at, bodies, points, .. } = hit else { panic!("{hit:?}") };
+    let end = json!({ "hit": true, "free_until": free_until, "at": touching_at, "bodies": bodies, "points": points });
+    assert_eq!(lines[0], json!({ "start": ends[0], "goal": ends[1], "end": end }));
+    assert!(free == RobotMotion::Free && lines[1] == json!({ "start": ends[0], "goal": ends[2] }), "{lines}");
+    assert_eq!(bodies[1], "wall");
+    let wrong = RobotLine { start: ends[0].to_vec(), edge: Some((vec![0.0; 3], &free)) };
+    assert!(matches!(Page::of_robot(&mut robot, [wrong]), Err(PageError::Robot(_))));
 }
 
 #[test]
