@@ -1,11 +1,14 @@
 //! `cbvh robot`: asks a robot from a URDF file about configurations of its joints, and about edges between them.
 
+mod page;
+
 use crate::asking::files::{self, numbers, parse_placed, read_lines, stem};
 use crate::asking::mesh::{How, LoadedMesh};
 use crate::asking::runner::Run;
 use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure, Record, counted, record, shown, significant, tell_warning};
 use crate::options::{not_negative, positive};
+use crate::view::output::PageArguments;
 use bvh_format::checksum::Hasher;
 use bvh_query::{Distance, MotionOptions, OwnedShape, PenetrationOptions, Pose, QueryError, ReadAhead};
 use cbvh_robot::{Edge, NearPair, Robot, RobotDistance, RobotError, RobotMotion, RobotOptions};
@@ -20,6 +23,7 @@ Examples:
   cbvh robot panda.urdf --srdf panda.srdf configurations.txt --mode near --margin 0.05 --json
   cbvh robot panda.urdf --srdf panda.srdf --obstacle cell.cbvh edges.txt --edges --jobs 4 --json > answers.jsonl
   cbvh robot arm.urdf --package-dir ros/src --joints \"0 0.4 -1.2 0\"
+  cbvh robot panda.urdf --srdf panda.srdf --obstacle cell.cbvh edges.txt --edges --view robot.html
 
 Each line of FILE has one number for each joint value, in the order of the joints in the URDF file: radians for joints that turn and \
 metres for those that slide. Fixed joints and joints that mimic others have none; a planar joint has three (x, y, theta), and a \
@@ -49,7 +53,11 @@ without folders and extension, with #2, #3 and so on if the name is taken. --pro
 
 --bench prints one object: what was asked, the times of the questions, positives (contact, or hits) and answers_xxh3, a hash of the answers, which is the \
 same for every --isa and --jobs. It is null if --budget cut the run short. Tests of nodes and triangles are not counted, and are null. \
---out writes the lines, each with its nanoseconds.";
+--out writes the lines, each with its nanoseconds.
+
+--view writes a page that shows the robot among its obstacles where the first line puts it, and needs nothing but a browser. It has a \
+slider for each joint value, colours the bodies that touch, and lists all lines of FILE. An edge is played to its goal or to where \
+it hits. The page needs no FILE; the joint values are then 0, or the limits nearest to 0.";
 
 /// What `robot` accepts.
 #[derive(Debug, Args)]
@@ -58,7 +66,7 @@ pub(crate) struct RobotArguments {
     /// The URDF file of the robot
     urdf: PathBuf,
     /// Configurations of the joints, or edges with --edges, one per line
-    #[arg(required_unless_present = "one", conflicts_with = "one")]
+    #[arg(required_unless_present_any = ["one", "view"], conflicts_with = "one")]
     file: Option<PathBuf>,
     /// An SRDF file, whose disabled pairs are not asked about
     #[arg(long, value_name = "SRDF")]
@@ -101,6 +109,18 @@ pub(crate) struct RobotArguments {
     /// Ask about one configuration (with --edges: one edge), given as a line of FILE, and print the answer for a person
     #[arg(id = "one", long = "joints", value_name = "NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     joints: Option<String>,
+    /// Write a page that shows the robot, with a slider for each joint value
+    #[arg(long, value_name = "PAGE.html")]
+    view: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArguments,
+}
+
+impl RobotArguments {
+    /// Returns whether there are questions. A page needs none.
+    fn asks(&self) -> bool {
+        self.file.is_some() || self.joints.is_some()
+    }
 }
 
 /// A question about all pairs of bodies.
@@ -129,6 +149,7 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<(), Failure> {
     };
     let obstacles =
         arguments.obstacle.iter().map(|text| parse_obstacle(text)).collect::<Result<Vec<_>, _>>()?;
+    page::check(arguments, &obstacles)?;
     let start = Instant::now();
     let robot = &mut read_robot(arguments)?;
     robot.set_backend(backend);
@@ -140,6 +161,10 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<(), Failure> {
         add_obstacle(robot, path, pose, arguments)?;
     }
     build_seconds += start.elapsed().as_secs_f64();
+    if questions.is_empty() {
+        return page::write_alone(robot, arguments);
+    }
+    page::refuse_large(robot, arguments)?;
 
     // Contact is a matter of one pair, unless the others are to be told.
     let list = arguments.run.json || arguments.file.is_none();
@@ -151,6 +176,7 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<(), Failure> {
     let words = if arguments.edges { ["edge", "edges"] } else { ["configuration", "configurations"] };
     let Some(file) = &arguments.file else {
         let answer = ask(robot, &questions[0])?;
+        page::write(robot, arguments, questions.iter().zip([&answer]))?;
         return match arguments.run.json {
             true => console::json(&Record::of(words[0], &0).with(asking::Answer::json(&answer))),
             false => console::text(&answer.describe()),
@@ -162,6 +188,7 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<(), Failure> {
     if let Some(out) = &arguments.out {
         run.write_raw(out)?;
     }
+    page::write(&mut robot.clone(), arguments, questions.iter().zip(run.answers()))?;
     if !arguments.bench {
         return run.tell(words, None, arguments.run.json);
     }
@@ -201,7 +228,7 @@ fn read_robot(arguments: &RobotArguments) -> Result<Robot, Failure> {
     let robot = Robot::from_urdf(&arguments.urdf, &options);
     let robot = robot.map_err(|error| from_robot(error, &arguments.urdf))?;
     robot.warnings().iter().for_each(|warning| tell_warning(warning));
-    if robot.joints().is_empty() {
+    if robot.joints().is_empty() && arguments.asks() {
         let what =
             "expected a robot with joints that move, found none; cbvh scene asks about shapes without joints";
         return Err(Failure::invalid(&arguments.urdf, what));
@@ -269,7 +296,7 @@ fn read_questions(arguments: &RobotArguments, robot: &Robot) -> Result<Vec<Quest
     };
     let parse = |text: &str| parse(text, robot, arguments.edges, &expected);
     let Some(file) = &arguments.file else {
-        let text = arguments.joints.as_deref().unwrap_or_default();
+        let Some(text) = &arguments.joints else { return Ok(Vec::new()) };
         let asked = files::parse_option("--joints", text, &expected, parse)?;
         return Ok(vec![Question { line: 1, asked }]);
     };

@@ -1,7 +1,8 @@
 //! Tests `cbvh robot` on two boxes whose contact, distance and first hits follow from arithmetic, and that bad inputs are named.
 
-use crate::common::{Ended, Files as _, Place, backends, cbvh_in, cbvh_with_isa, cube, place};
-use serde_json::Value;
+use crate::common::{Ended, Files as _, Place, backends, cbvh_in, cbvh_with_isa, cube, names, place};
+use crate::view::page;
+use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
@@ -14,6 +15,8 @@ const URDF: &str = r#"<robot name="two">
   <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
     <limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
 </robot>"#;
+
+const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// The cube of side 2 around x = 5.
 const AT_5: &str = "cube.obj@1 0 0 5  0 1 0 0  0 0 1 0";
@@ -336,6 +339,121 @@ fn obstacles_may_be_solid_and_pairs_disabled() {
     assert_eq!(none, serde_json::json!({ "configuration": 0, "distance": null }));
     let one = disabled(&["--mode", "distance", "--obstacle", AT_5]).out;
     near(one.trim().parse().unwrap(), 2.0, 1e-12);
+}
+
+/// The answers in a page are those that are printed, and what a page has of the joints follows from the URDF.
+#[test]
+fn a_page_has_the_joints_and_the_answers() {
+    let directory = &world();
+    directory.write("e.txt", "0 2.5 0 4.5\n-1 2.5 1 2.5\n");
+    let ask = ["e.txt", "--edges", "--obstacle", AT_5, "--json", "--view", "page.html"];
+    let records = robot(directory, &ask).done().json_lines();
+    let (content, files) = page(directory);
+    let show = &content["show"];
+    assert_eq!((files.len(), &show["kind"]), (3, &json!("robot")));
+    let turn = json!({
+        "kind": "turn", "parent": 0, "origin": IDENTITY, "axis": [0.0, 0.0, 1.0], "value": 0, "factor": 1.0, "offset": 0.0
+    });
+    let slide = json!({
+        "kind": "slide", "parent": 0, "origin": IDENTITY, "axis": [1.0, 0.0, 0.0], "value": 1, "factor": 1.0, "offset": 0.0
+    });
+    assert_eq!(show["joints"], json!([turn, slide]));
+    let values = json!([
+        { "name": "turn", "at": 0.0, "lower": -PI, "upper": PI }, { "name": "slide", "at": 2.5, "lower": -9.0, "upper": 9.0 }
+    ]);
+    assert_eq!(show["values"], values);
+    let at = |x: f64| {
+        let mut rows = IDENTITY;
+        rows[3] = x;
+        rows
+    };
+    for (number, name, frame, origin, pose) in
+        [(0, "arm", 1, 1.5, 1.5), (1, "cart", 2, 0.0, 2.5), (2, "cube", 0, 5.0, 5.0)]
+    {
+        let instance = &show["instances"][number];
+        assert!(instance["name"] == name && instance["frame"] == frame, "{instance}");
+        assert_eq!((&instance["origin"], &instance["pose"]), (&json!(at(origin)), &json!(at(pose))));
+    }
+    let lines = &show["lines"];
+    let end = &lines[0]["end"];
+    assert_eq!((&lines[0]["start"], &lines[0]["goal"]), (&json!([0.0, 2.5]), &json!([0.0, 4.5])));
+    let told = [("free_until", "free_until"), ("at", "touching_at")]
+        .map(|(one, other)| (&end[one], &records[0][other]));
+    assert!(told.iter().all(|(shown, told)| shown == told && told.is_f64()), "{end}");
+    assert_eq!((&end["hit"], &end["bodies"]), (&json!(true), &json!(["cart", "cube"])));
+    assert_eq!(end["points"], json!([records[0]["point_a"], records[0]["point_b"]]));
+    assert_eq!(lines[1], json!({ "start": [-1.0, 2.5], "goal": [1.0, 2.5] }));
+
+    // Configurations have no answers: the page asks.
+    write_configurations(directory);
+    let out = robot(directory, &["q.txt", "--view", "page.html", "--limit", "3"]).done().out;
+    assert_eq!(out, "0\n0\n1\n");
+    let starts: Vec<Value> =
+        CONFIGURATIONS[..3].iter().map(|(start, ..)| json!({ "start": start })).collect();
+    assert_eq!(page(directory).0["show"]["lines"], json!(starts));
+    assert!(robot(directory, &["--joints", "0 1.5", "--view", "page.html"]).done().out.starts_with("1 pair"));
+    assert_eq!(page(directory).0["show"]["lines"], json!([{ "start": [0.0, 1.5] }]));
+
+    // Without questions, a page alone, of a robot without joints as well.
+    let out = robot(directory, &["--view", "page.html"]).done().out;
+    assert_eq!(out, "page.html: shows two.urdf\n");
+    let values = &page(directory).0["show"]["values"];
+    assert_eq!((&values[0]["at"], &values[1]["at"]), (&json!(0.0), &json!(0.0)));
+    // Within the limits, with a quaternion that does not turn. The page chooses the ends of lengths without limits.
+    let joint = |kind: &str, child: &str| {
+        format!(
+            r#"<link name="{child}"/><joint name="{child}" type="{kind}"><parent link="cart"/><child link="{child}"/></joint>"#
+        )
+    };
+    let more = format!("{}{}</robot>", joint("planar", "p"), joint("floating", "f"));
+    directory.write("more.urdf", URDF.replace(r#"lower="-9""#, r#"lower="1""#).replace("</robot>", &more));
+    directory.cbvh("robot more.urdf --view page.html").done();
+    let (content, _) = page(directory);
+    let values = content["show"]["values"].as_array().unwrap();
+    let ends = |value: &Value| ["lower", "at", "upper"].map(|name| value[name].as_f64());
+    let (none, turn, part) =
+        ([None, Some(0.0), None], [Some(-PI), Some(0.0), Some(PI)], [Some(-1.0), Some(0.0), Some(1.0)]);
+    let (slide, real) = ([1.0, 1.0, 9.0].map(Some), [-1.0, 1.0, 1.0].map(Some));
+    let expected = [turn, slide, none, none, turn, none, none, none, part, part, part, real];
+    assert_eq!(values.iter().map(ends).collect::<Vec<_>>(), expected);
+    let kinds: Vec<&Value> =
+        content["show"]["joints"].as_array().unwrap().iter().map(|joint| &joint["kind"]).collect();
+    assert_eq!(kinds, ["turn", "slide", "planar", "floating"]);
+    let still = r#"<robot name="s"><link name="base"><collision><geometry><sphere radius="1"/></geometry></collision></link></robot>"#;
+    directory.write("still.urdf", still);
+    directory.cbvh("robot still.urdf --view page.html").done();
+    let show = &page(directory).0["show"];
+    assert_eq!([&show["joints"], &show["values"], &show["lines"]], [&json!([]); 3]);
+    assert_eq!(show["instances"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn pages_that_cannot_be_written_are_named() {
+    let directory = &world();
+    write_configurations(directory);
+    directory.write("two.srdf", r#"<robot name="two"/>"#);
+    let before = names(directory);
+    let ask = |more: &[&str]| robot(directory, &[&["q.txt"], more].concat());
+    ask(&["--view", "-"]).failed(1, &["--view: expected a file, found -"]);
+    ask(&["--view", "none/page.html"]).failed(2, &["the folder none"]);
+    ask(&["--view", "."]).failed(2, &["directory"]);
+    ask(&["--view", "a.html", "--view", "b.html"]).failed(1, &["--view"]);
+    for input in ["two.urdf", "q.txt", "cube.obj", "two.srdf"] {
+        let more = ["--srdf", "two.srdf", "--obstacle", AT_5, "--view", &format!("./{input}")];
+        ask(&more).failed(1, &[input, "found an input"]);
+    }
+    ask(&["--max-page", "1MiB"]).failed(1, &["--max-page requires --view"]);
+    let large = ask(&["--view", "page.html", "--max-page", "100"]);
+    assert!(large.out.is_empty());
+    large.failed(4, &["--max-page 1MiB"]);
+    for more in ["--edges", "--json", "--bench"] {
+        robot(directory, &["--view", "page.html", more]).failed(1, &["require FILE"]);
+    }
+    // A mistake in the questions leaves no page.
+    directory.write("wrong.txt", "0 0 0\n");
+    robot(directory, &["wrong.txt", "--view", "page.html"]).failed(3, &["wrong.txt"]);
+    std::fs::remove_file(directory.join("wrong.txt")).unwrap();
+    assert_eq!(names(directory), before);
 }
 
 #[test]

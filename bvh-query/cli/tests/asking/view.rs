@@ -46,7 +46,7 @@ fn unpacked(html: &str) -> (Value, Vec<Vec<u8>>) {
 
 /// Returns what `page.html` says and has.
 #[track_caller]
-fn page(folder: &Path) -> (Value, Vec<Vec<u8>>) {
+pub(crate) fn page(folder: &Path) -> (Value, Vec<Vec<u8>>) {
     unpacked(&folder.text("page.html"))
 }
 
