@@ -14,6 +14,7 @@ import { Pair } from "./pair.js";
 import { openParts, type Part } from "./parts.js";
 import { identity, move, type Pose, placedAt } from "./pose.js";
 import { Probes } from "./probes.js";
+import { RobotView } from "./robot.js";
 import { SceneView } from "./scene.js";
 import { Selection } from "./selection.js";
 import { View } from "./view.js";
@@ -25,6 +26,7 @@ export class App {
     readonly pair: Pair;
     readonly motion: MotionView;
     readonly scene: SceneView;
+    readonly robot: RobotView;
     readonly inside: Inside;
     readonly probes: Probes;
     readonly drop: Drop;
@@ -42,6 +44,7 @@ export class App {
         this.pair = new Pair(this.view);
         this.motion = new MotionView(this.view, this.pair);
         this.scene = new SceneView(this.view, this.look);
+        this.robot = new RobotView(this.view, this.scene);
         this.inside = new Inside(this.view, this.pair, this.look);
         this.probes = new Probes(this.view, this.pair);
         this.drop = new Drop(this.view, (file) => this.take(file));
@@ -78,6 +81,11 @@ export class App {
         const { show } = content;
         if (show.kind === "scene" || show.kind === "clash") {
             await this.#showScene(parts, show);
+            return;
+        }
+        if (show.kind === "robot") {
+            await this.#showScene(parts, { ...show, kind: "scene", frames: [] });
+            this.robot.set(show);
             return;
         }
         const [first, second = isTwice(content) ? parts[0] : undefined] = parts;
@@ -130,6 +138,7 @@ export class App {
         this.selection.clear();
         this.pair.clear();
         this.motion.clear();
+        this.robot.clear();
         this.scene.clear();
         for (const body of this.view.bodies) {
             body.remove();
@@ -301,14 +310,15 @@ export class App {
     }
 
     togglePlay(): void {
-        (this.view.mode === "scene" ? this.scene : this.motion).toggle();
+        (this.view.isRobot ? this.robot : this.view.mode === "scene" ? this.scene : this.motion).toggle();
     }
 
     step(by: number): void {
-        if (this.view.mode === "scene") {
+        if (this.view.mode === "scene" && !this.view.isRobot) {
             void this.scene.go(this.scene.frame + by);
         } else {
-            void this.motion.go(this.motion.time + by / 100);
+            const timed = this.view.isRobot ? this.robot : this.motion;
+            void timed.go(timed.time + by / 100);
         }
     }
 }

@@ -33,6 +33,48 @@ export interface ContentClash {
     pierced?: [number | null, number | null];
 }
 
+/** A shape that a joint of a robot carries. Shapes of one body have one name. */
+export interface ContentCarried extends ContentInstance {
+    /** 0 is the world, and each joint moves the next frame. */
+    frame: number;
+    /** Where it is in that frame. */
+    origin: Numbers12;
+}
+
+export interface ContentJoint {
+    kind: "turn" | "slide" | "planar" | "floating";
+    /** The frame that it hangs from, and where it is there. */
+    parent: number;
+    origin: Numbers12;
+    axis: [number, number, number];
+    /** The place of its value, or of the first of them, and by what that is multiplied and moved. */
+    value: number;
+    factor: number;
+    offset: number;
+}
+
+export interface ContentValue {
+    name: string;
+    /** What it is in the poses of the instances. */
+    at: number;
+    /** The ends of its slider; `null` leaves them to the page. */
+    lower: number | null;
+    upper: number | null;
+}
+
+/** A configuration or, with a goal, an edge, which may end before its goal. */
+export interface ContentLine {
+    start: number[];
+    goal?: number[];
+    end?: {
+        hit: boolean;
+        free_until: number;
+        at: number;
+        bodies: [string, string];
+        points: [number[], number[]];
+    };
+}
+
 export type Show =
     | { kind: "file" }
     | { kind: "pair"; pose: Numbers12; within?: number; same?: boolean }
@@ -44,7 +86,15 @@ export type Show =
           pair_margins?: [number, number, number][];
           frames: number[][];
       }
-    | { kind: "clash"; instances: ContentInstance[]; clashes: ContentClash[] };
+    | { kind: "clash"; instances: ContentInstance[]; clashes: ContentClash[] }
+    | {
+          kind: "robot";
+          instances: ContentCarried[];
+          allowed: [number, number][];
+          joints: ContentJoint[];
+          values: ContentValue[];
+          lines: ContentLine[];
+      };
 
 export interface Content {
     version: 1;

@@ -32,7 +32,9 @@ function stateOf(app: App): string {
         }
         parameters.set("time", String(app.motion.time));
     }
-    if (app.view.mode === "scene") {
+    if (app.view.isRobot) {
+        parameters.set("joints", numbers(app.robot.values));
+    } else if (app.view.mode === "scene") {
         parameters.set("frame", String(app.scene.frame));
     }
     const { current } = app.selection;
@@ -89,7 +91,10 @@ async function restoreFrom(app: App, parameters: URLSearchParams): Promise<void>
             await app.pair.setPose(pose);
         }
     }
-    if (frame !== undefined && mode === "scene") {
+    const joints = numbers("joints", app.robot.values.length);
+    if (joints !== undefined) {
+        await app.robot.place([...joints]);
+    } else if (frame !== undefined && mode === "scene") {
         await app.scene.go(frame);
     }
     const text = (name: string) => parameters.get(name) ?? undefined;
@@ -115,6 +120,9 @@ export function copyCommand(app: App): void {
 export function commandOf(app: App): string | undefined {
     const { mode, panel } = app.view;
     const { a, b } = app.pair;
+    if (app.view.isRobot) {
+        return `cbvh robot URDF --joints "${words(app.robot.values)}"`;
+    }
     if (mode === "scene" || a === undefined) {
         return mode === "scene" ? "cbvh scene SCENE FRAMES --mode pairs --list" : "cbvh view";
     }

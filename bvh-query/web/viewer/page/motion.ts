@@ -12,19 +12,17 @@ import { Player } from "./player.js";
 import { move, numbersOf } from "./pose.js";
 import type { View } from "./view.js";
 
-/** How long a motion plays, in milliseconds. */
-const DURATION = 4000;
 /** Places of B's centre along the path that are drawn. */
 const PATH_POINTS = 96;
 
 export class MotionView {
     readonly #overlay: Overlay;
     readonly #answerBox = h("div", { class: "answer" });
-    readonly #player = new Player(
+    readonly #player: Player = new Player(
         "Time of the motion",
         "any",
         (time) => this.go(time),
-        () => this.#begin(),
+        () => this.#motion && this.#player.evenly(),
     );
     readonly #rows = h("textarea", {
         class: "code",
@@ -91,7 +89,7 @@ export class MotionView {
     }
 
     #showNothing(): void {
-        this.#player.slider.classList.add("plain");
+        this.#player.colour();
         fill(this.#answerBox, h("p", { class: "muted" }, "No motion yet. Set its start and its end below."));
     }
 
@@ -184,12 +182,7 @@ export class MotionView {
                     isHit ? "Go to the first hit" : "Go to this moment",
                 ),
         );
-        const percent = (share: number) => `${(100 * share).toFixed(3)}%`;
-        const { slider } = this.#player;
-        const { style } = slider;
-        style.setProperty("--free", percent(freeUntil));
-        style.setProperty("--hit", percent(kind === 0 ? 1 : at));
-        slider.classList.remove("plain");
+        this.#player.colour(freeUntil, kind === 0 ? 1 : at);
     }
 
     async #drawPath(b: Body, motion: Float64Array, answer: MotionAnswer): Promise<void> {
@@ -256,18 +249,6 @@ export class MotionView {
 
     stop(): void {
         this.#player.stop();
-    }
-
-    #begin(): (() => number | undefined) | undefined {
-        if (this.#motion === undefined) {
-            return undefined;
-        }
-        const from = this.time >= 1 ? 0 : this.time;
-        const began = performance.now() - from * DURATION;
-        return () => {
-            const time = (performance.now() - began) / DURATION;
-            return time < 1 || this.time < 1 ? Math.min(time, 1) : undefined;
-        };
     }
 
     #read(): void {

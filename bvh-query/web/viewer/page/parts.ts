@@ -27,9 +27,7 @@ export async function openParts(
         packed[k] = "";
     }
     const parts: ({ name: string; file: number } & ContentPart)[] =
-        show.kind === "scene" || show.kind === "clash"
-            ? show.instances
-            : files.map((part, file) => ({ ...part, file }));
+        "instances" in show ? show.instances : files.map((part, file) => ({ ...part, file }));
     // Each is read once, however often it is drawn.
     const read = new Map<string, Part>();
     const all: Part[] = [];

@@ -2,6 +2,9 @@
 
 import { fill, h, type IconName, iconButton } from "./dom.js";
 
+/** How long a time from 0 to 1 plays, in milliseconds. */
+const DURATION = 4000;
+
 /** Returns the next value of the slider, or `undefined` at the end. */
 type Next = () => number | undefined;
 
@@ -10,6 +13,7 @@ export class Player {
     readonly element: HTMLElement;
     readonly #button = iconButton("play", "Play or pause (Space)", () => this.toggle());
     readonly #number = h("output", { class: "number time" });
+    #value = 0;
     #playing = 0;
 
     /**
@@ -31,12 +35,13 @@ export class Player {
             class: "timeline plain",
             "aria-label": label,
         });
-        this.slider.addEventListener("input", () => void go(this.value));
+        this.slider.addEventListener("input", () => void go(this.slider.valueAsNumber));
         this.element = h("div", { class: "player" }, this.#button, this.slider, this.#number);
     }
 
+    /** The value that was shown last. The slider keeps 15 of its digits. */
     get value(): number {
-        return this.slider.valueAsNumber;
+        return this.#value;
     }
 
     /** The value nearest to this one that the slider has. */
@@ -46,8 +51,28 @@ export class Player {
     }
 
     show(value: number, text: string): void {
+        this.#value = value;
         this.slider.value = String(value);
         this.#number.textContent = text;
+    }
+
+    /** Colours a timeline: free until one time, and hit at another. Without times, it is plain. */
+    colour(freeUntil?: number, hit = 1): void {
+        const percent = (share: number) => `${(100 * share).toFixed(3)}%`;
+        const { classList, style } = this.slider;
+        classList.toggle("plain", freeUntil === undefined);
+        style.setProperty("--free", percent(freeUntil ?? 1));
+        style.setProperty("--hit", percent(hit));
+    }
+
+    /** Plays evenly until a time, from the start if it is past that. */
+    evenly(until = 1): Next {
+        const from = this.value >= until ? 0 : this.value;
+        const began = performance.now() - from * DURATION;
+        return () => {
+            const time = (performance.now() - began) / DURATION;
+            return time < until || this.value < until ? Math.min(time, until) : undefined;
+        };
     }
 
     #setIcon(icon: IconName): void {

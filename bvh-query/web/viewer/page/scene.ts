@@ -43,8 +43,13 @@ export class SceneView implements Tint {
     #clashes: ContentClash[] = [];
     #frames: number[][] = [];
     #moving: number[] = [];
-    #touching = new Set<number>();
+    /** The names of instances that touch: a body of a robot has several, which have one name. */
+    #touching = new Set<string>();
     #chosen: [number, number] | undefined;
+    /** What a robot adds to the tab. */
+    readonly extra = h("div");
+    /** Instances that are coloured although they do not touch, by their names. */
+    readonly marks = new Map<string, "hit" | "near">();
 
     constructor(
         readonly view: View,
@@ -53,7 +58,7 @@ export class SceneView implements Tint {
         this.#overlay = new Overlay(view.stage, 20);
         this.#pairOverlay = new Overlay(view.stage, 30);
         const scene = view.panel.add("scene", "Scene");
-        scene.append(this.#frameBox, this.#player.element, part("Pairs that touch", this.#list));
+        scene.append(this.#frameBox, this.extra, this.#player.element, part("Pairs that touch", this.#list));
         const clash = view.panel.add("clash", "Clashes");
         clash.append(
             h("div", { class: "fields" }, h("span", { class: "fields-title" }, "show"), this.#filter),
@@ -74,6 +79,7 @@ export class SceneView implements Tint {
         this.#clashes = [];
         this.#frames = [];
         this.#touching.clear();
+        this.marks.clear();
         this.#chosen = undefined;
         this.look.tint = undefined;
     }
@@ -158,7 +164,14 @@ export class SceneView implements Tint {
     #showFrame({ touching, nearest, took }: FrameAnswer): void {
         const { view } = this;
         const { palette } = view.stage;
-        this.#touching = new Set(touching);
+        // One pair of instances for each pair of names.
+        const named = new Map<string, [number, number]>();
+        for (let k = 0; k + 1 < touching.length; k += 2) {
+            const [a, b] = [touching[k] ?? 0, touching[k + 1] ?? 0];
+            const names = `${this.#name(a)}\n${this.#name(b)}`;
+            named.set(names, named.get(names) ?? [a, b]);
+        }
+        this.#touching = new Set(Array.from(touching, (instance) => this.#name(instance)));
         this.recolour();
         this.#overlay.clear();
         if (nearest !== undefined && nearest.distance > 0) {
@@ -167,24 +180,22 @@ export class SceneView implements Tint {
             this.#overlay.dots(ends, palette.near, 11);
             this.#overlay.label(short(nearest.distance), nearest.pointA, "near");
         }
-        const pairs = touching.length / 2;
+        const pairs = named.size;
         view.setAnswer({ distance: nearest?.distance ?? null, touching: pairs, frame: this.frame, took });
+        const [number, text] =
+            pairs > 0
+                ? [countOf(pairs), pairs === 1 ? "pair touches" : "pairs touch"]
+                : nearest === undefined
+                  ? ["0", "pairs can touch"]
+                  : [short(nearest.distance), "to the nearest pair"];
         fill(
             this.#frameBox,
             h("div", { class: `relation ${pairs > 0 ? "hit" : "free"}` }, pairs > 0 ? "Touching" : "Apart"),
             h(
                 "div",
                 { class: "headline" },
-                h(
-                    "span",
-                    { class: "headline-number" },
-                    pairs > 0 ? countOf(pairs) : short(nearest?.distance ?? Number.NaN),
-                ),
-                h(
-                    "span",
-                    { class: "muted" },
-                    pairs > 0 ? (pairs === 1 ? "pair touches" : "pairs touch") : "to the nearest pair",
-                ),
+                h("span", { class: "headline-number" }, number),
+                h("span", { class: "muted" }, text),
             ),
             h(
                 "dl",
@@ -195,10 +206,8 @@ export class SceneView implements Tint {
                 fact("answered in", milliseconds(took)),
             ),
         );
-        const rows = Array.from({ length: Math.min(pairs, MAX_LISTED) }, (_, k) => {
-            const [a, b] = [touching[2 * k] ?? 0, touching[2 * k + 1] ?? 0];
-            return this.#row(a, b, "", () => void this.choose(a, b));
-        });
+        const listed = [...named.values()].slice(0, MAX_LISTED);
+        const rows = listed.map(([a, b]) => this.#row(a, b, "", () => void this.choose(a, b)));
         fill(this.#list, ...(rows.length > 0 ? rows : [h("p", { class: "muted" }, "None in this frame.")]));
         if (pairs > MAX_LISTED) {
             this.#list.append(h("p", { class: "muted" }, `and ${countOf(pairs - MAX_LISTED)} more`));
@@ -240,7 +249,7 @@ export class SceneView implements Tint {
 
     /** Whether an instance neither moves nor touches another one. */
     isBackground(instance: number): boolean {
-        return this.#instances[instance]?.moving !== true && !this.#touching.has(instance);
+        return this.#instances[instance]?.moving !== true && !this.#touching.has(this.#name(instance));
     }
 
     colourOf(instance: number): number {
@@ -252,8 +261,10 @@ export class SceneView implements Tint {
         if (this.#clashes.length > 0) {
             return palette.still;
         }
-        if (this.#touching.has(instance)) {
-            return palette.hit;
+        const name = this.#name(instance);
+        const mark = this.#touching.has(name) ? "hit" : this.marks.get(name);
+        if (mark !== undefined) {
+            return palette[mark];
         }
         return this.#instances[instance]?.moving === true ? palette.moving : palette.still;
     }

@@ -91,7 +91,7 @@ export class Selection {
             return;
         }
         this.clear();
-        if (view.mode === "scene") {
+        if (view.mode === "scene" && !view.isRobot) {
             view.handles.attach(body);
         }
         this.current = { body: number, triangle };

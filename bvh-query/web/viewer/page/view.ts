@@ -17,6 +17,8 @@ export class View {
     bodies: Body[] = [];
     /** Two meshes or one, or a scene. */
     mode: "pair" | "scene" = "pair";
+    /** Whether the scene is a robot, which sliders move. */
+    isRobot = false;
     /** The largest side of what is shown, in mesh units. */
     size = 1;
 

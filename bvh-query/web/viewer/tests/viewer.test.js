@@ -16,6 +16,7 @@ import { chromium } from "playwright-core";
 import { ROOT } from "../../tests/files.js";
 import { filled, MARK, template } from "./fill.js";
 import { box, overlaps, ring, scene } from "./meshes.js";
+import { allKinds, armAndCart, configurations } from "./robots.js";
 
 const COMMAND = process.env.CBVH;
 const WITHOUT = COMMAND === undefined && "CBVH names no command";
@@ -879,6 +880,222 @@ test("pages of the command show objects, scenes and clashes of one file", { skip
     const clash = await view("clash", parts, "--clearance", 4, "--view");
     // The report is the command's: the page has no answer of its own before somebody chooses a clash.
     assert.deepEqual([clash.triangles, clash.clashes, clash.distance], [[12, 12], 1, null]);
+});
+
+/** Writes the page of a robot with the command. Returns what it shows, and its text. */
+function robotPage(urdf, ...words) {
+    const out = path.join(folder, "robot.html");
+    command("robot", written("robot.urdf", urdf), ...words, "--view", out);
+    const html = readFileSync(out, "utf8");
+    const [, content] = /id="cbvh-content">(.*?)<\/script>/s.exec(html);
+    return { html, show: JSON.parse(content).show };
+}
+
+const lines = (name, rows) => written(name, rows.map((row) => `${row.join(" ")}\n`).join(""));
+
+/** The distance, and the pairs of bodies in contact, that the command finds in each configuration. */
+function askedAbout(urdf, file, ...words) {
+    const ask = (mode) =>
+        command("robot", written("robot.urdf", urdf), file, ...words, "--mode", mode, "--json")
+            .trim()
+            .split("\n")
+            .map(JSON.parse);
+    const [distances, contacts] = [ask("distance"), ask("collide")];
+    return distances.map(({ distance }, k) => ({ distance, touching: contacts[k].pairs?.length ?? 0 }));
+}
+
+const near = (found, expected, tolerance) => {
+    assert.equal(found.length, expected.length);
+    found.forEach((value, k) => {
+        assert.ok(Math.abs(value - expected[k]) <= tolerance, `${value} is not ${expected[k]}, number ${k}`);
+    });
+};
+
+test("a robot's links are where the library puts them, and touch as the command says", { skip: WITHOUT }, async () => {
+    const asked = askedAbout(allKinds, lines("q.txt", configurations));
+    assert.ok(new Set(asked.map(({ touching }) => touching)).size > 1, JSON.stringify(asked));
+    const pages = configurations.map((values) => robotPage(allKinds, "--joints", values.join(" ")));
+    const { page, errors, close } = await open(pages[1].html);
+    assert.equal(await state(page), "ready");
+    // As the library has placed it.
+    near([(await answer(page)).distance], [asked[1].distance], 1e-15);
+    for (const [k, values] of configurations.entries()) {
+        const poses = await page.evaluate(async (values) => {
+            const { robot, view } = window.cbvhView;
+            await robot.place(values);
+            return view.bodies.map((body) => [...body.pose]);
+        }, values);
+        near(
+            poses.flat(),
+            pages[k].show.instances.flatMap(({ pose }) => pose),
+            1e-13,
+        );
+        const { distance, touching } = await answer(page);
+        near([distance], [asked[k].distance], 1e-12);
+        assert.equal(touching, asked[k].touching);
+    }
+    // The quaternion turns the shorter way: by a third of the angle from the one configuration to the other.
+    const [start, goal] = [configurations[1], configurations[2]];
+    const edge = robotPage(allKinds, "--edges", "--joints", [...start, ...goal].join(" "));
+    const third = await open(edge.html);
+    const values = await third.page.evaluate(async () => {
+        await window.cbvhView.robot.go(1 / 3);
+        return window.cbvhView.robot.values;
+    });
+    near(
+        values.slice(0, 8),
+        start.slice(0, 8).map((from, k) => from + (goal[k] - from) / 3),
+        1e-13,
+    );
+    const cosine = (a, b) => Math.abs(a.reduce((sum, value, k) => sum + value * b[k], 0));
+    const [from, to, at] = [start, goal, values].map((all) => all.slice(8));
+    const angles = [Math.acos(cosine(from, at)), Math.acos(cosine(at, to))];
+    const whole = Math.acos(cosine(from, to));
+    near(angles, [whole / 3, (2 * whole) / 3], 1e-12);
+    assert.deepEqual([...errors, ...third.errors], []);
+    await third.close();
+    await close();
+});
+
+test("sliders move the links of a robot, and links that touch are coloured", { skip: WITHOUT }, async () => {
+    const { html } = robotPage(
+        armAndCart,
+        lines("q.txt", [
+            [0.5, 3],
+            [0, -12],
+        ]),
+    );
+    const { page, errors, close } = await open(html);
+    const slider = (name) => page.locator(`input[type=range][aria-label="${name}"]`);
+    const ends = (name) => slider(name).evaluate(({ min, max }) => [Number(min), Number(max)]);
+    assert.deepEqual(await ends("turn"), [-Math.PI, Math.PI]);
+    assert.deepEqual(await ends("slide"), [-9, 9]);
+    const look = () =>
+        page.evaluate(() => {
+            const { bodies, stage } = window.cbvhView.view;
+            const { hit } = stage.palette;
+            return bodies.map((body) => [body.name, body.pose[3], body.mesh.material.color.getHex() === hit]);
+        });
+    const set = async (name, value) => {
+        const before = await page.getAttribute("html", "data-answer");
+        await slider(name).fill(String(value));
+        await changed(page, before);
+    };
+    assert.deepEqual(
+        (await look()).map(([, , touches]) => touches),
+        [false, false, false],
+    );
+    await set("turn", 0);
+    assert.deepEqual(await look(), [
+        ["arm", 1.5, false],
+        ["cart", 3, false],
+        ["cart", 3, false],
+    ]);
+    assert.equal((await answer(page)).distance, 0.75);
+    await set("slide", 1.5);
+    // Both halves of the cart touch the arm: one pair of bodies, and all of it is coloured.
+    assert.deepEqual(await look(), [
+        ["arm", 1.5, true],
+        ["cart", 1.5, true],
+        ["cart", 1.5, true],
+    ]);
+    assert.equal((await answer(page)).touching, 1);
+    assert.equal(await page.locator("#page-scene .list-row").count(), 1);
+    await picture(page, "robot");
+    // A link to this view has the joint values, and so has the command.
+    const hash = await page.evaluate(() => {
+        document.querySelector('[aria-label^="Copy a link"]').click();
+        return location.hash;
+    });
+    const again = await open(html, { hash });
+    assert.deepEqual(await again.page.evaluate(() => window.cbvhView.robot.values), [0, 1.5]);
+    await again.close();
+    const said = await page.evaluate(() => {
+        let copied;
+        window.cbvhView.view.copy = async (text) => {
+            copied = text;
+        };
+        document.querySelector('[aria-label^="Copy the command line"]').click();
+        return copied;
+    });
+    assert.equal(said, 'cbvh robot URDF --joints "0 1.5"');
+    // The other line of the file, whose value is outside of the limits, which are not checked.
+    await page.selectOption('select[aria-label="Line of the file"]', { value: "1" });
+    await page.waitForFunction(() => window.cbvhView.view.bodies[1].pose[3] === -12);
+    assert.deepEqual(await ends("slide"), [-12, 9]);
+    assert.ok(await page.isHidden('input[aria-label="Time of the edge"]'));
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("an edge of a robot is played until it hits", { skip: WITHOUT }, async () => {
+    const slide = Math.hypot(2, 0.125) + 0.25 + 1e-9;
+    const edges = lines("e.txt", [
+        [0, 2.5, 0, 4.5],
+        [-1, 2.5, 1, 2.5],
+        [-1, slide, 1, slide],
+    ]);
+    const words = ["--obstacle", `${written("box.obj", box())}@4.25 0 0 0 0 0 1`, edges, "--edges"];
+    const records = command("robot", written("robot.urdf", armAndCart), ...words, "--json");
+    const asked = records.trim().split("\n").map(JSON.parse);
+    assert.deepEqual(
+        asked.map((record) => record.answer),
+        ["hit", "free", "near"],
+    );
+    const { page, errors, close } = await open(robotPage(armAndCart, ...words).html);
+    const options = await page.locator('select[aria-label="Line of the file"] option').allTextContents();
+    assert.deepEqual(
+        options.map((text) => /^\d: [a-z]+/.exec(text)[0]),
+        ["1: hit", "2: free", "3: near"],
+    );
+    const ended = async (number) => {
+        await page.selectOption('select[aria-label="Line of the file"]', { value: String(number) });
+        await page.locator('#page-scene [aria-label^="Play"]').first().click();
+        await page.waitForFunction(() => window.cbvhView.robot.time > 0);
+        // Its icon says when the player has stopped.
+        await page.waitForFunction(
+            () => document.querySelector("#page-scene .player path").getAttribute("d") === "M8 5v14l11-7z",
+        );
+        return page.evaluate(() => {
+            const { robot, view } = window.cbvhView;
+            const colours = view.bodies.map((body) => body.mesh.material.color.getHex());
+            const { hit, near, moving, still } = view.stage.palette;
+            const names = new Map([
+                [hit, "hit"],
+                [near, "near"],
+                [moving, "moving"],
+                [still, "still"],
+            ]);
+            return { time: robot.time, values: robot.values, colours: colours.map((colour) => names.get(colour)) };
+        });
+    };
+    const hit = await ended(0);
+    assert.equal(hit.time, asked[0].touching_at);
+    near(hit.values, asked[0].joints, 1e-15);
+    assert.deepEqual(hit.colours, ["moving", "hit", "hit", "hit"]);
+    assert.equal((await factsIn(page, "#page-scene .part")).bodies, "cart, box");
+    await picture(page, "edge");
+    const free = await ended(1);
+    assert.deepEqual([free.time, free.values, free.colours], [1, [1, 2.5], ["moving", "moving", "moving", "still"]]);
+    const undecided = await ended(2);
+    assert.equal(undecided.time, asked[2].at);
+    assert.deepEqual(undecided.colours, ["near", "near", "near", "still"]);
+    assert.ok(await page.isVisible("#page-scene .relation.near"));
+    assert.deepEqual(errors, []);
+    await close();
+});
+
+test("a robot without joints has a page without sliders", { skip: WITHOUT }, async () => {
+    const { page, errors, close } = await open(
+        robotPage(
+            '<robot name="still"><link name="base"><collision><geometry><sphere radius="1"/></geometry></collision></link></robot>',
+        ).html,
+    );
+    assert.equal(await state(page), "ready");
+    assert.ok(await page.isVisible("text=This robot has no joints that move"));
+    assert.equal(await page.locator("#page-scene input[type=range]:visible").count(), 0);
+    assert.deepEqual(errors, []);
+    await close();
 });
 
 test("numbers that are no pose have no answer, and the next ones have", { skip: WITHOUT }, async () => {
