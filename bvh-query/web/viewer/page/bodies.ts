@@ -4,6 +4,7 @@ import {
     BackSide,
     BufferAttribute,
     BufferGeometry,
+    CapsuleGeometry,
     DataTexture,
     DoubleSide,
     FrontSide,
@@ -13,9 +14,11 @@ import {
     LineSegments,
     Mesh,
     MeshMatcapMaterial,
+    Quaternion,
     RGBAFormat,
     type Side,
     SRGBColorSpace,
+    Vector3,
 } from "three";
 import type { FileSummary } from "../worker/files.js";
 import type { Asker } from "./asker.js";
@@ -78,6 +81,8 @@ export class Shown {
     pageStarts: Uint32Array = new Uint32Array();
     /** The level whose boxes are drawn in place of triangles. */
     boxLevel: number | undefined;
+    /** Whether the triangles of the file are drawn, and not something in their place. */
+    hasTriangles = false;
     #smooth: BufferAttribute | undefined;
     #facing: Side = DoubleSide;
 
@@ -91,8 +96,10 @@ export class Shown {
         const { number, bounds } = summary;
         const [x0 = 0, y0 = 0, z0 = 0, x1 = 0, y1 = 0, z1 = 0] = bounds;
         if (summary.drawn) {
-            const { positions, centre, pageStarts } = await asker.ask("triangles", number);
+            const { positions: stored, centre, pageStarts } = await asker.ask("triangles", number);
             const shown = new Shown(summary, centre);
+            const positions = capsuleOf(stored, summary.radius) ?? stored;
+            shown.hasTriangles = positions === stored;
             shown.geometry.setAttribute("position", new BufferAttribute(positions, 3));
             shown.pageStarts = pageStarts;
             shown.#facing = summary.closed === true ? outside(positions) : DoubleSide;
@@ -146,6 +153,20 @@ export class Shown {
         this.#smooth ??= new BufferAttribute(smoothNormals(this.positions), 3, true);
         return this.#smooth;
     }
+}
+
+/** The triangles of a capsule or a ball: of a file with one triangle that is a segment or a point, and has a radius. */
+function capsuleOf(stored: Float32Array, radius: number): Float32Array | undefined {
+    const [a, b, c] = [0, 3, 6].map((at) => new Vector3().fromArray(stored, at)) as [Vector3, Vector3, Vector3];
+    const [p, q] = a.equals(b) ? [a, c] : [a, b];
+    if (stored.length !== 9 || radius <= 0 || !(c.equals(p) || c.equals(q))) {
+        return undefined;
+    }
+    const way = q.clone().sub(p);
+    const turn = new Quaternion().setFromUnitVectors(new Vector3(0, 1, 0), way.clone().normalize());
+    const capsule = new CapsuleGeometry(radius, way.length(), 8, 32).toNonIndexed();
+    const { x, y, z } = p.add(q).divideScalar(2);
+    return capsule.applyQuaternion(turn).translate(x, y, z).getAttribute("position").array as Float32Array;
 }
 
 /** The side of triangles that is outside of a closed mesh: the sign of its volume tells. */

@@ -360,7 +360,7 @@ export class Inside {
         }
         const known = new Map<number, BufferAttribute>();
         for (const body of this.view.bodies) {
-            if (paint === "plain" || body.shown.boxLevel !== undefined) {
+            if (paint === "plain" || !body.shown.hasTriangles) {
                 body.paint(undefined, this.look.colourOf(body));
                 continue;
             }

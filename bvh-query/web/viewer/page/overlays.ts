@@ -171,7 +171,7 @@ export class Overlay {
 
     /** Paints triangles of a body, given by their places in the drawn order. */
     triangles(body: Body, places: Uint32Array, colour: number, opacity = 1): void {
-        if (places.length === 0 || body.shown.boxLevel !== undefined) {
+        if (places.length === 0 || !body.shown.hasTriangles) {
             return;
         }
         const positions = new Float32Array(9 * places.length);

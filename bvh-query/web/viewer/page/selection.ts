@@ -86,7 +86,7 @@ export class Selection {
     async select(number: number, triangle: number, hit?: Hit): Promise<void> {
         const { view } = this;
         const body = view.bodies[number];
-        const isDrawn = body !== undefined && body.shown.boxLevel === undefined && body.shown.has(triangle);
+        const isDrawn = body?.shown.hasTriangles === true && body.shown.has(triangle);
         if (body === undefined || (hit === undefined && !isDrawn)) {
             return;
         }

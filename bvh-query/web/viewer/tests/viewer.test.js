@@ -1085,6 +1085,33 @@ test("an edge of a robot is played until it hits", { skip: WITHOUT }, async () =
     await close();
 });
 
+test("balls and capsules are drawn round, at their radius", { skip: WITHOUT }, async () => {
+    const link = (shape) =>
+        `<robot name="still"><link name="base"><collision><geometry>${shape}</geometry></collision></link></robot>`;
+    for (const [shape, half] of [
+        ['<sphere radius="0.75"/>', 0],
+        ['<capsule radius="0.75" length="3"/>', 1.5],
+    ]) {
+        const { page, errors, close } = await open(robotPage(link(shape)).html);
+        const positions = await page.evaluate(() => [...window.cbvhView.view.bodies[0].shown.positions]);
+        assert.ok(positions.length > 900, `${positions.length}`);
+        const [distances, heights] = [[], []];
+        for (let k = 0; k < positions.length; k += 3) {
+            const [x, y, z] = positions.slice(k, k + 3);
+            distances.push(Math.hypot(x, y, z - Math.min(Math.max(z, -half), half)));
+            heights.push(z);
+        }
+        near(
+            distances,
+            distances.map(() => 0.75),
+            1e-6,
+        );
+        near([Math.min(...heights), Math.max(...heights)], [-half - 0.75, half + 0.75], 1e-6);
+        assert.deepEqual(errors, []);
+        await close();
+    }
+});
+
 test("a robot without joints has a page without sliders", { skip: WITHOUT }, async () => {
     const { page, errors, close } = await open(
         robotPage(
