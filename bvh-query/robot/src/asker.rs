@@ -2,10 +2,18 @@
 
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
-use crate::near_pairs::Candidate;
 use crate::rod::are_within;
+use crate::screening::Screening;
 use crate::setting::{Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
+
+/// A pair that may be near: its bodies, how far the balls around its parts are apart, and its number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) bodies: [usize; 2],
+    pub(crate) gap: f64,
+    pub(crate) number: usize,
+}
 
 /// A querier, and where everything is in the configuration in question.
 pub(crate) struct Asker {
@@ -20,6 +28,8 @@ pub(crate) struct Asker {
     likely: usize,
     /// Memory for the pairs that may be near.
     pub(crate) candidates: Vec<Candidate>,
+    /// What may come near.
+    pub(crate) screening: Screening,
 }
 
 impl std::fmt::Debug for Asker {
@@ -42,7 +52,8 @@ impl Asker {
 
     pub(crate) fn with(querier: Querier) -> Self {
         let (groups, centres, candidates) = (Vec::new(), Vec::new(), Vec::new());
-        Self { querier, groups, centres, slack: 0.0, likely: usize::MAX, candidates }
+        let screening = Screening::default();
+        Self { querier, groups, centres, slack: 0.0, likely: usize::MAX, candidates, screening }
     }
 
     /// Goes to a configuration.
@@ -76,7 +87,7 @@ impl Asker {
     }
 
     #[inline]
-    fn touches(&mut self, setting: &Setting, number: usize) -> Result<bool, RobotError> {
+    pub(crate) fn touches(&mut self, setting: &Setting, number: usize) -> Result<bool, RobotError> {
         let pair = &setting.pairs[number];
         let reach = pair.reach + self.slack;
         if squared_distance(&self.centres[pair.a], &self.centres[pair.b]) > reach * reach {

@@ -39,6 +39,17 @@ impl Edge {
     /// Returns bounds of a joint value on the whole way.
     fn bounds(&self, number: usize) -> Bounds {
         let of = &self.coefficients[number];
+        if let [from, way] = of[..] {
+            // What the general rule gives.
+            let sum = from.abs() + way.abs();
+            let most = from.abs().max((from + way).abs()) + sum * ROUNDING_OF_TERMS;
+            return Bounds {
+                way: most,
+                rate: way.abs() + way.abs() * ROUNDING_OF_TERMS,
+                acceleration: 0.0,
+                terms: 2.0 * sum,
+            };
+        }
         let first = derivative(of);
         let terms = of.len() as f64 * of.iter().map(|coefficient| coefficient.abs()).sum::<f64>();
         Bounds { way: most(of), rate: most(&first), acceleration: most(&derivative(&first)), terms }
@@ -109,7 +120,7 @@ fn most(of: &[f64]) -> f64 {
 }
 
 /// How the quaternion of a floating joint turns: about one axis, at a constant rate, the shorter way.
-struct Turning {
+pub(crate) struct Turning {
     from: [f64; 4],
     to: [f64; 4],
     /// The whole angle of the turn.
@@ -117,7 +128,7 @@ struct Turning {
 }
 
 impl Turning {
-    fn of(edge: &Edge, first: usize) -> Self {
+    pub(crate) fn of(edge: &Edge, first: usize) -> Self {
         let unit = |t: f64| {
             let numbers: Vec<f64> =
                 edge.coefficients[first..first + 7].iter().map(|of| value(of, t)).collect();
@@ -133,7 +144,7 @@ impl Turning {
     }
 
     /// Returns the quaternion at a time.
-    fn at(&self, t: f64) -> [f64; 4] {
+    pub(crate) fn at(&self, t: f64) -> [f64; 4] {
         let half = self.angle / 2.0;
         if half < 1e-9 {
             // Linear to within 1e-19, and the length is divided out.
@@ -165,8 +176,12 @@ pub(crate) fn at(model: &Model, edge: &Edge, t: f64) -> Vec<f64> {
     numbers
 }
 
-/// Returns bounds of how a joint turns and of how it slides.
-pub(crate) fn parts_of(kind: &Kind, edge: &Edge) -> [Bounds; 2] {
+/// Returns bounds of how each joint turns and of how it slides.
+pub(crate) fn bounds(model: &Model, edge: &Edge) -> Vec<[Bounds; 2]> {
+    model.joints.iter().map(|joint| parts_of(&joint.kind, edge)).collect()
+}
+
+fn parts_of(kind: &Kind, edge: &Edge) -> [Bounds; 2] {
     let still = Bounds::default();
     match kind {
         Kind::Turn { by, .. } => [edge.bounds_of(by), still],
@@ -186,6 +201,21 @@ pub(crate) fn parts_of(kind: &Kind, edge: &Edge) -> [Bounds; 2] {
 mod tests {
     use super::*;
     use cbvh_testkit::Random;
+
+    #[test]
+    fn straight_motions_have_the_bounds_of_polynomials() {
+        let random = &mut Random::new(38);
+        for _ in 0..500 {
+            let of = vec![random.signed(), random.signed()];
+            let Bounds { way, rate, acceleration, terms } = Edge::polynomials(vec![of.clone()]).bounds(0);
+            let first = derivative(&of);
+            let sum: f64 = of.iter().map(|x| x.abs()).sum();
+            assert_eq!(
+                [way, rate, acceleration, terms],
+                [most(&of), most(&first), most(&derivative(&first)), 2.0 * sum]
+            );
+        }
+    }
 
     #[test]
     fn bounds_of_polynomials_hold() {

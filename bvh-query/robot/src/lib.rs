@@ -6,7 +6,8 @@
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
 //!                                                  ├──> questions about configurations (questions, asker, rod)
 //!                                                  ├──> pairs that are near, with derivatives (near_pairs)
-//!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns)
+//!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns),
+//!                                                  │      most of them by balls (screening, screen, cover, states, clearances)
 //!                                                  ├──> plain data, and back (parts)
 //!                                                  └──> what programs draw (tree)
 //! ```
@@ -15,9 +16,12 @@
 
 mod asker;
 mod capsules;
+mod clearances;
+mod cover;
 mod edge;
 mod error;
 mod frame;
+mod lanes;
 mod mimic;
 mod model;
 mod motions;
@@ -31,10 +35,13 @@ mod robot;
 mod rod;
 mod rod_of;
 mod schema;
+mod screen;
+mod screening;
 mod setting;
 mod shapes;
 mod source;
 mod srdf;
+mod states;
 #[cfg(test)]
 mod testing;
 mod tree;

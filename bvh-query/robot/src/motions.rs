@@ -1,15 +1,17 @@
 //! Questions about motions in joint space, certain at every moment.
 
 use crate::asker::{Asker, failed};
-use crate::edge::{Edge, at, parts_of, value};
+use crate::edge::{Bounds, Edge, at, bounds, value};
 use crate::error::RobotError;
 use crate::frame::length;
 use crate::model::Kind;
 use crate::pair_path::{Interval, JointPaths, PairPath, ROUNDED_UP};
 use crate::questions::bodies;
 use crate::robot::Robot;
+use crate::screen::Screens;
+use crate::screening::{Screening, Search, Test, mask};
 use crate::setting::Setting;
-use bvh_query::{Distance, MotionAnswer, MotionOptions, QueryError, RigidPath};
+use bvh_query::{Distance, MotionAnswer, MotionOptions, Querier, QueryError, RigidPath};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
@@ -61,8 +63,13 @@ impl Robot {
     /// short way, ask about the goal that [`Robot::nearest_turns`] returns. A body that is inside a mesh all the way without touching
     /// it is free: see [`Robot::pairs_inside`].
     ///
-    /// Cost: that of [`Querier::is_free`](bvh_query::Querier::is_free) for each pair that may come near on the way, until one is
-    /// not free. It grows with the number of turns, and turns of more than 16,384 radians are refused.
+    /// Cost: balls around the links, at some moments, against each other and against what stands still, until that of
+    /// [`Querier::is_free`](bvh_query::Querier::is_free) for each pair and interval that they leave. It grows with the number of turns,
+    /// and turns of more than 16,384 radians are refused.
+    ///
+    /// How far obstacles are away is kept, for all clones and threads, until one of them moves, comes or goes: in cells of space, which are
+    /// filled where motions pass. That takes some MiB, at most 128 MiB. The first motion after a change takes longer; the first of
+    /// all also computes the balls, and reads the shapes of all links for that. Nothing of it affects an answer.
     ///
     /// # Errors
     /// The errors of [`Robot::collide`].
@@ -76,7 +83,7 @@ impl Robot {
     /// The errors of [`Robot::is_free`].
     pub fn is_edge_free(&mut self, edge: &Edge, options: &MotionOptions) -> Result<bool, RobotError> {
         self.refresh();
-        self.asker.is_free(&self.setting, edge, options)
+        self.asker.is_free((&self.setting, &self.screens), edge, options)
     }
 
     /// Returns whether each of many motions is certainly free. Uses all threads of the rayon pool in which it is called.
@@ -84,18 +91,18 @@ impl Robot {
     /// # Errors
     /// The errors of [`Robot::is_free`], of the first motion that has one.
     pub fn are_free(&mut self, edges: &[Edge], options: &MotionOptions) -> Result<Vec<bool>, RobotError> {
-        self.many_edges(edges, |asker, setting, edge| asker.is_free(setting, edge, options))
+        self.many_edges(edges, |asker, known, edge| asker.is_free(known, edge, options))
     }
 
     /// Asks about many motions.
     fn many_edges<R: Send>(
         &mut self,
         edges: &[Edge],
-        ask: impl Fn(&mut Asker, &Setting, &Edge) -> Result<R, RobotError> + Sync,
+        ask: impl Fn(&mut Asker, (&Setting, &Screens), &Edge) -> Result<R, RobotError> + Sync,
     ) -> Result<Vec<R>, RobotError> {
         self.refresh();
-        let (setting, asker) = (&*self.setting, &self.asker);
-        let ask = |asker: &mut Asker, edge: &Edge| ask(asker, setting, edge);
+        let (known, asker) = ((&*self.setting, &*self.screens), &self.asker);
+        let ask = |asker: &mut Asker, edge: &Edge| ask(asker, known, edge);
         edges.par_iter().map_init(|| asker.clone(), ask).collect::<Vec<_>>().into_iter().collect()
     }
 
@@ -105,7 +112,7 @@ impl Robot {
     /// # Errors
     /// [`RobotError::Count`] and [`RobotError::Value`].
     pub fn check_edge(&self, edge: &Edge) -> Result<(), RobotError> {
-        check(&self.setting, edge)
+        check(&self.setting, edge).map(drop)
     }
 
     /// Returns whether a motion is free, and otherwise what touches first, and when. What [`Robot::is_free`] says of the way
@@ -119,7 +126,7 @@ impl Robot {
     /// The errors of [`Robot::is_free`].
     pub fn motion(&mut self, edge: &Edge, options: &MotionOptions) -> Result<RobotMotion, RobotError> {
         self.refresh();
-        self.asker.motion(&self.setting, edge, options)
+        self.asker.motion((&self.setting, &self.screens), edge, options)
     }
 
     /// Returns for each of many motions what [`Robot::motion`] does. Uses all threads of the rayon pool in which it is called.
@@ -131,7 +138,7 @@ impl Robot {
         edges: &[Edge],
         options: &MotionOptions,
     ) -> Result<Vec<RobotMotion>, RobotError> {
-        self.many_edges(edges, |asker, setting, edge| asker.motion(setting, edge, options))
+        self.many_edges(edges, |asker, known, edge| asker.motion(known, edge, options))
     }
 
     /// Returns what touches first on a path of straight motions through many configurations, with the number of the motion; `None`
@@ -169,40 +176,56 @@ const MOST_HALVED: u32 = 1 << 12;
 impl Asker {
     fn is_free(
         &mut self,
-        setting: &Setting,
+        (setting, screens): (&Setting, &Screens),
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<bool, RobotError> {
-        check(setting, edge)?;
+        let bounds = check(setting, edge)?;
         // Pairs that stay apart would not refuse them.
         options.check()?;
-        // Most motions that are not free touch at one of these.
-        if options.clearance == 0.0 {
-            for t in [1.0, 0.5, 0.25, 0.75] {
-                if self.collide(setting, &at(&setting.model, edge, t))? {
+        self.with_screening(|asker, screening| {
+            let screen = screens.of(setting, &mut asker.querier)?;
+            let steps = screening.start(screen.0, setting, edge, &bounds);
+            let is_tested = options.clearance == 0.0;
+            let test = &mut Touches { asker, setting, edge, steps, is_tested, placed: None };
+            if Search::new(screen, setting, screening, test).motion(options)? {
+                return Ok(false);
+            }
+            if screening.found.is_empty() {
+                return Ok(true);
+            }
+            let joints = JointPaths::new(&setting.model, edge, &bounds);
+            for &(number, near) in &screening.found {
+                let pair = &setting.pairs[number];
+                let path = PairPath::new(setting, pair, &joints)?;
+                let free = asker.is_pair_free(&path, 1.0, Steps { count: steps, near }, options);
+                if !free.map_err(|source| failed(setting, pair, source))? {
                     return Ok(false);
                 }
             }
-        }
-        let joints = JointPaths::new(&setting.model, edge);
-        for pair in &setting.pairs {
-            let path = PairPath::new(setting, pair, &joints)?;
-            let free =
-                self.is_pair_free(&path, 1.0, options).map_err(|source| failed(setting, pair, source))?;
-            if !free {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+            Ok(true)
+        })
     }
 
-    /// Returns whether B stays farther from A than the clearance, until a time. An interval is free if what separates both in its middle is more
+    /// Asks something with the memory for screening.
+    fn with_screening<T>(
+        &mut self,
+        ask: impl FnOnce(&mut Self, &mut Screening) -> Result<T, RobotError>,
+    ) -> Result<T, RobotError> {
+        let mut screening = std::mem::take(&mut self.screening);
+        let answer = ask(self, &mut screening);
+        self.screening = screening;
+        answer
+    }
+
+    /// Returns whether B stays farther from A than the clearance, until a time, given the steps in which it may come near. An interval is free if what separates both in its middle is more
     /// than B moves on the way there: seen from the balls around both, or else from the shapes. Others are halved, until the bound
     /// of the sagitta decides, which is the better one for short intervals.
     fn is_pair_free(
         &mut self,
         path: &PairPath<'_>,
         until: f64,
+        steps: Steps,
         options: &MotionOptions,
     ) -> Result<bool, QueryError> {
         let (a, b) = (path.a, path.b);
@@ -211,6 +234,15 @@ impl Asker {
         let mut todo = VecDeque::from([[0.0, until]]);
         let mut halved = 0;
         while let Some([t0, t1]) = todo.pop_front() {
+            match steps.of([t0, t1]) {
+                Some(false) => continue,
+                None if (t1 - t0) * steps.count as f64 > 1.0 => {
+                    let at = (t0 + t1) / 2.0;
+                    todo.extend([[t0, at], [at, t1]]);
+                    continue;
+                }
+                _ => {}
+            }
             let (middle, bound) = path.follow(b.middle, b.radius, [t0, t1]);
             let moved = (bound.speed * (t1 - t0) / 2.0 + bound.rounding) * ROUNDED_UP + limit;
             if length([0, 1, 2].map(|k| middle[k] - a.middle[k])) > path.reach + moved {
@@ -242,24 +274,27 @@ impl Asker {
         Ok(true)
     }
 
-    /// Returns a time at which a pair is within the clearance, and the pair: the earliest of some.
+    /// Returns a time at which one of some pairs is within the clearance, and the pair: the earliest of some times.
     fn sampled_hit(
         &mut self,
         setting: &Setting,
-        edge: &Edge,
+        joints: &JointPaths<'_>,
+        (found, steps): (&[(usize, u64)], usize),
         options: &MotionOptions,
     ) -> Result<Option<(f64, usize)>, RobotError> {
-        let joints = JointPaths::new(&setting.model, edge);
-        let paths: Result<Vec<_>, _> =
-            setting.pairs.iter().map(|pair| PairPath::new(setting, pair, &joints)).collect();
-        let paths = paths?;
+        let path = |&(number, near): &(usize, u64)| {
+            let path = PairPath::new(setting, &setting.pairs[number], joints)?;
+            Ok((path, Steps { count: steps, near }, number))
+        };
+        let paths = found.iter().map(path).collect::<Result<Vec<_>, RobotError>>()?;
         for sample in 0..=SAMPLES {
             let time = f64::from(sample) / f64::from(SAMPLES);
-            for (number, path) in paths.iter().enumerate() {
+            let may_be_near = |steps: &Steps| steps.of([time, time]) != Some(false);
+            for (path, _, number) in paths.iter().filter(|(_, steps, _)| may_be_near(steps)) {
                 let near =
                     self.querier.within(&path.a.shape, &path.b.shape, &path.pose(time), options.clearance);
-                if near.map_err(|source| failed(setting, &setting.pairs[number], source))? {
-                    return Ok(Some((time, number)));
+                if near.map_err(|source| failed(setting, &setting.pairs[*number], source))? {
+                    return Ok(Some((time, *number)));
                 }
             }
         }
@@ -268,25 +303,45 @@ impl Asker {
 
     fn motion(
         &mut self,
-        setting: &Setting,
+        (setting, screens): (&Setting, &Screens),
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<RobotMotion, RobotError> {
-        check(setting, edge)?;
+        let bounds = check(setting, edge)?;
         // Pairs that stay apart would not refuse them.
         options.check()?;
+        self.with_screening(|asker, screening| {
+            let screen = screens.of(setting, &mut asker.querier)?;
+            let steps = screening.start(screen.0, setting, edge, &bounds);
+            let test = &mut Touches { asker, setting, edge, steps, is_tested: false, placed: None };
+            Search::new(screen, setting, screening, test).motion(options)?;
+            let found = &mut screening.found;
+            found.sort_unstable();
+            asker.first_hit(setting, (edge, &bounds), (found, steps), options)
+        })
+    }
+
+    /// Returns which of the pairs that may come near is the first one that does, and when.
+    fn first_hit(
+        &mut self,
+        setting: &Setting,
+        (edge, bounds): (&Edge, &[[Bounds; 2]]),
+        (found, steps): (&[(usize, u64)], usize),
+        options: &MotionOptions,
+    ) -> Result<RobotMotion, RobotError> {
         // Once a hit is known, nothing later matters.
         let (mut free_until, mut hit, mut near) = (1.0f64, None, None);
         let mut until = 1.0;
-        let joints = JointPaths::new(&setting.model, edge);
-        for (number, pair) in setting.pairs.iter().enumerate() {
+        let joints = JointPaths::new(&setting.model, edge, bounds);
+        for &(number, when) in found {
+            let pair = &setting.pairs[number];
             let path = PairPath::new(setting, pair, &joints)?;
             let failed = |source| failed(setting, pair, source);
-            if self.is_pair_free(&path, until, options).map_err(failed)? {
+            if self.is_pair_free(&path, until, Steps { count: steps, near: when }, options).map_err(failed)? {
                 continue;
             }
             if hit.is_none() && near.is_none() {
-                hit = self.sampled_hit(setting, edge, options)?;
+                hit = self.sampled_hit(setting, &joints, (found, steps), options)?;
                 until = hit.map_or(until, |(time, _)| time);
             }
             if until == 0.0 {
@@ -330,15 +385,73 @@ impl Asker {
     }
 }
 
-/// Returns an error unless the edge is of all joint values, and both ends are valid. Quaternions only turn at a constant rate.
-fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
+/// Whether pairs touch in the middle of a step of a motion.
+struct Touches<'a> {
+    asker: &'a mut Asker,
+    setting: &'a Setting,
+    edge: &'a Edge,
+    steps: usize,
+    /// Whether any pair is tested.
+    is_tested: bool,
+    /// The step where the asker is.
+    placed: Option<usize>,
+}
+
+impl Test for Touches<'_> {
+    fn querier(&mut self) -> &mut Querier {
+        &mut self.asker.querier
+    }
+
+    fn is_hit(&mut self, pair: usize, step: usize) -> Result<bool, RobotError> {
+        if !self.is_tested {
+            return Ok(false);
+        }
+        if self.placed != Some(step) {
+            let time = (step as f64 + 0.5) / self.steps as f64;
+            self.asker.place(self.setting, &at(&self.setting.model, self.edge, time))?;
+            self.placed = Some(step);
+        }
+        self.asker.touches(self.setting, pair)
+    }
+}
+
+/// Equal steps of time, and in which of them a pair may come near, a bit each.
+#[derive(Clone, Copy)]
+struct Steps {
+    count: usize,
+    near: u64,
+}
+
+impl Steps {
+    /// Returns whether the pair may come near in an interval of time; none if it may in a part of the steps there.
+    fn of(self, [t0, t1]: [f64; 2]) -> Option<bool> {
+        let count = self.count as f64;
+        // A time between two steps is in both.
+        let [from, to] = if t0 == t1 {
+            [((t0 * count).ceil() as usize).saturating_sub(1), (t0 * count).floor() as usize + 1]
+        } else {
+            [(t0 * count).floor() as usize, (t1 * count).ceil() as usize]
+        };
+        let from = from.min(self.count - 1);
+        let of = mask(from, to.clamp(from + 1, self.count));
+        match self.near & of {
+            0 => Some(false),
+            near if near == of => Some(true),
+            _ => None,
+        }
+    }
+}
+
+/// Returns bounds of how each joint turns and slides; an error unless the edge is of all joint values, and both ends are valid.
+/// Quaternions only turn at a constant rate.
+fn check(setting: &Setting, edge: &Edge) -> Result<Vec<[Bounds; 2]>, RobotError> {
     let model = &setting.model;
     for t in [0.0, 1.0] {
         let numbers: Vec<f64> = edge.coefficients.iter().map(|of| value(of, t)).collect();
         model.check(&numbers)?;
     }
-    for joint in &model.joints {
-        let [turn, _] = parts_of(&joint.kind, edge);
+    let bounds = bounds(model, edge);
+    for (joint, [turn, _]) in model.joints.iter().zip(&bounds) {
         // NaN is not within anything.
         if !(0.0..=MAX_TURN).contains(&turn.rate) {
             let (joint, expected) = (joint.name.clone(), "a turn at no more than 16,384 radians per motion");
@@ -352,5 +465,5 @@ fn check(setting: &Setting, edge: &Edge) -> Result<(), RobotError> {
             return Err(RobotError::Value { joint, expected, found: found.len() as f64 });
         }
     }
-    Ok(())
+    Ok(bounds)
 }

@@ -9,7 +9,7 @@
 //! A joint that turns moves a point x at the rate w x (x - o), where w is its axis and o a point of the axis. The component of that
 //! along n is w . ((x - o) x n).
 
-use crate::asker::{Asker, boxes_apart, failed};
+use crate::asker::{Asker, Candidate, boxes_apart, failed};
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
 use crate::model::{Joint, Kind, quaternion_length};
@@ -29,14 +29,6 @@ pub struct NearPair {
     pub nearest: SignedDistance,
     /// The derivative of `nearest.distance` by each joint value, in the order of [`Robot::joints`]: metres per radian, or per metre.
     pub gradient: Vec<f64>,
-}
-
-/// A pair that may be near: its bodies, how far the balls around its parts are apart, and its number.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidate {
-    bodies: [usize; 2],
-    gap: f64,
-    number: usize,
 }
 
 impl Robot {
@@ -315,7 +307,7 @@ mod tests {
                     };
                     let [(back, before), (on, after)] = [beside(-STEP), beside(STEP)];
                     let slopes = [(before - now) / back, (after - now) / on];
-                    if !((slopes[0] - slopes[1]).abs() < 1e-4) {
+                    if (slopes[0] - slopes[1]).abs() >= 1e-4 {
                         jumps += 1;
                         continue;
                     }

@@ -25,7 +25,7 @@
 //! translation 2 u. The angle of a turn is off by less than 2 u n times the sum S of the magnitudes of the n terms of its polynomial,
 //! which moves the point by that times R. A point and both ends of its chord are off: 64 u R (1 + n S) for each step.
 
-use crate::edge::{Bounds, Edge, at, parts_of};
+use crate::edge::{Bounds, Edge, at};
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, length};
 use crate::model::{Joint, Kind, Model};
@@ -37,15 +37,15 @@ pub(crate) struct JointPaths<'a> {
     model: &'a Model,
     edge: &'a Edge,
     /// How each joint turns and slides.
-    bounds: Vec<[Bounds; 2]>,
+    bounds: &'a [[Bounds; 2]],
     /// The frame of each joint's child in that of its parent in the middle of the motion.
     middle: Vec<Frame>,
 }
 
 impl<'a> JointPaths<'a> {
-    pub(crate) fn new(model: &'a Model, edge: &'a Edge) -> Self {
+    /// Takes bounds of how each joint turns and slides.
+    pub(crate) fn new(model: &'a Model, edge: &'a Edge, bounds: &'a [[Bounds; 2]]) -> Self {
         let numbers = at(model, edge, MIDDLE);
-        let bounds = model.joints.iter().map(|joint| parts_of(&joint.kind, edge)).collect();
         Self { model, edge, bounds, middle: model.joints.iter().map(|joint| joint.at(&numbers)).collect() }
     }
 }
@@ -239,6 +239,7 @@ impl Kind {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edge::bounds;
     use crate::options::Base;
     use crate::testing::{robot, tree, values};
     use cbvh_testkit::Random;
@@ -271,7 +272,8 @@ mod tests {
             let robot = robot(&tree(random, 2 + round), Base::Floating);
             let (setting, numbers) = (&robot.setting, values(random, &robot, 1.0));
             let edge = Edge::straight(&numbers, &numbers).unwrap();
-            let joints = JointPaths::new(&setting.model, &edge);
+            let bounds = bounds(&setting.model, &edge);
+            let joints = JointPaths::new(&setting.model, &edge, &bounds);
             for pair in &setting.pairs {
                 let path = PairPath::new(setting, pair, &joints).unwrap();
                 let [a, b] = [path.a, path.b].map(|part| setting.model.above(part.group).collect::<Vec<_>>());
@@ -306,7 +308,8 @@ mod tests {
                     of.extend([0.5 * random.signed(), random.signed(), random.signed()]);
                 }
             }
-            let joints = JointPaths::new(&robot.setting.model, &edge);
+            let bounds = bounds(&robot.setting.model, &edge);
+            let joints = JointPaths::new(&robot.setting.model, &edge, &bounds);
             for pair in &robot.setting.pairs {
                 let path = PairPath::new(&robot.setting, pair, &joints).unwrap();
                 for _ in 0..4 {
@@ -331,7 +334,8 @@ mod tests {
             robot.refresh();
             let [from, to] = [(); 2].map(|()| values(random, &robot, [0.3, 3.0][round % 2]));
             let edge = Edge::straight(&from, &to).unwrap();
-            let joints = JointPaths::new(&robot.setting.model, &edge);
+            let bounds = bounds(&robot.setting.model, &edge);
+            let joints = JointPaths::new(&robot.setting.model, &edge, &bounds);
             for pair in &robot.setting.pairs {
                 let path = PairPath::new(&robot.setting, pair, &joints).unwrap();
                 let long = [1.0, 0.1, 1e-3][random.below(3)];

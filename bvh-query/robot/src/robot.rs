@@ -6,6 +6,7 @@ use crate::error::RobotError;
 use crate::frame::Frame;
 use crate::model::{Link, Model};
 use crate::options::RobotOptions;
+use crate::screen::Screens;
 use crate::setting::{Body, Part, Setting};
 use crate::shapes::Shapes;
 use crate::source::Source;
@@ -48,6 +49,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Robot {
     pub(crate) setting: Arc<Setting>,
+    /// What has been computed of the setting.
+    pub(crate) screens: Arc<Screens>,
     pub(crate) asker: Asker,
     pub(crate) source: Arc<Source>,
     semantics: Arc<Semantics>,
@@ -63,6 +66,7 @@ impl Clone for Robot {
     fn clone(&self) -> Self {
         Self {
             setting: Arc::clone(&self.setting),
+            screens: Arc::clone(&self.screens),
             asker: self.asker.clone(),
             source: Arc::clone(&self.source),
             semantics: Arc::clone(&self.semantics),
@@ -75,6 +79,7 @@ impl Clone for Robot {
     /// Makes this a robot like another one, which keeps what it remembers of its own questions. None of it affects an answer.
     fn clone_from(&mut self, source: &Self) {
         self.setting = Arc::clone(&source.setting);
+        self.screens = Arc::clone(&source.screens);
         self.source = Arc::clone(&source.source);
         self.semantics = Arc::clone(&source.semantics);
         self.warnings = Arc::clone(&source.warnings);
@@ -134,6 +139,7 @@ impl Robot {
         let setting = Setting { model: Arc::new(model), parts, pairs: Vec::new(), bodies };
         let mut robot = Self {
             setting: Arc::new(setting),
+            screens: Arc::default(),
             asker: Asker::new()?,
             source: Arc::new(source),
             semantics: Arc::new(semantics),
@@ -273,7 +279,7 @@ impl Robot {
         if self.body(&name).is_ok() {
             return Err(RobotError::Taken(name));
         }
-        let setting = Arc::make_mut(&mut self.setting);
+        let setting = self.changed();
         let body = setting.bodies.len();
         let (group, origin) = match link {
             Some(link) => {
@@ -294,7 +300,7 @@ impl Robot {
     /// [`RobotError::Unknown`] if there is no such body, or if it is a link.
     pub fn remove(&mut self, name: &str) -> Result<(), RobotError> {
         let body = self.own_body(name)?;
-        let setting = Arc::make_mut(&mut self.setting);
+        let setting = self.changed();
         setting.bodies[body] = None;
         setting.parts.retain(|part| part.body != body);
         Arc::make_mut(&mut self.allowed).retain(|pair| !pair.contains(&body));
@@ -312,6 +318,10 @@ impl Robot {
         let mut link = None;
         if let Some(body) = &mut setting.bodies[body] {
             (link, body.pose) = (body.link, *pose);
+        }
+        match link {
+            Some(_) => self.screens = Arc::default(),
+            None => Arc::make_mut(&mut self.screens).forget_places(),
         }
         for part in setting.parts.iter_mut().filter(|part| part.body == body) {
             let origin =
@@ -355,7 +365,7 @@ impl Robot {
         shape: impl Fn(&Part) -> Result<(OwnedShape, f64), RobotError>,
     ) -> Result<(), RobotError> {
         let body = self.body(name)?;
-        let setting = Arc::make_mut(&mut self.setting);
+        let setting = self.changed();
         let mut parts = setting.parts.clone();
         for part in parts.iter_mut().filter(|part| part.body == body) {
             let (bare, margin) = shape(part)?;
@@ -457,11 +467,18 @@ impl Robot {
         })
     }
 
+    /// Returns the setting, to change it: what has been computed of it is forgotten.
+    fn changed(&mut self) -> &mut Setting {
+        self.screens = Arc::default();
+        Arc::make_mut(&mut self.setting)
+    }
+
     /// Lists the pairs that are asked about, after a change.
     pub(crate) fn refresh(&mut self) {
         if !std::mem::take(&mut self.is_stale) {
             return;
         }
-        Arc::make_mut(&mut self.setting).list_pairs(&self.allowed);
+        let allowed = Arc::clone(&self.allowed);
+        self.changed().list_pairs(&allowed);
     }
 }

@@ -1,13 +1,14 @@
 //! What questions are about: bodies, their shapes where they are, and the pairs that are asked about.
 
+use crate::cover::{Ball, cover};
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, departure, length};
 use crate::model::Model;
 use crate::rod::Rods;
 use crate::rod_of::rods_of;
-use bvh_query::{OwnedShape, Pose, Shape};
+use bvh_query::{OwnedShape, Pose, Querier, QueryError, Shape};
 use std::collections::HashSet;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A link, an obstacle or an attached object: shapes that do not move against each other.
 #[derive(Clone, Debug)]
@@ -46,6 +47,8 @@ pub(crate) struct Part {
     pub(crate) departure: f64,
     /// Of a ball, a capsule or a cylinder.
     pub(crate) rods: Option<Rods>,
+    /// Balls that together contain it, in its own frame: computed when they are first needed.
+    cover: Arc<OnceLock<Vec<Ball>>>,
 }
 
 impl Part {
@@ -76,7 +79,17 @@ impl Part {
             half,
             departure: departure_of(&origin),
             rods,
+            cover: Arc::default(),
         })
+    }
+
+    /// Returns balls that together contain the part.
+    pub(crate) fn cover(&self, querier: &mut Querier) -> Result<&[Ball], QueryError> {
+        if let Some(cover) = self.cover.get() {
+            return Ok(cover);
+        }
+        let cover = cover(&self.shape, querier)?;
+        Ok(self.cover.get_or_init(|| cover))
     }
 
     /// Moves it to another place in its group.
@@ -88,6 +101,9 @@ impl Part {
         }
     }
 }
+
+/// More than how often places that are not quite rigid are used on the way from one shape to another.
+pub(crate) const OFF_RIGID: f64 = 8.0;
 
 fn departure_of(origin: &Frame) -> f64 {
     let departure = departure(&origin.rotation);
@@ -151,6 +167,7 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
+    /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch.
     /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch. Pairs of
     /// the same bodies follow each other.
     pub(crate) fn list_pairs(&mut self, allowed: &HashSet<[usize; 2]>) {

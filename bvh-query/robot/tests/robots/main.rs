@@ -14,4 +14,5 @@ mod tree;
 mod turns;
 mod uris;
 mod warnings;
+mod worlds;
 mod xml;

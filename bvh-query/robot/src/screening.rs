@@ -1,0 +1,567 @@
+//! Asks a screen what may come near on a motion, and when.
+
+use crate::clearances::Clearances;
+use crate::cover::Ball;
+use crate::edge::{Bounds, Edge, Turning, value};
+use crate::error::RobotError;
+use crate::frame::{Point, each, length};
+use crate::model::{Kind, Model};
+use crate::screen::{Screen, Screened};
+use crate::setting::Setting;
+use crate::states::{LANES, Points, States};
+use bvh_query::{MotionOptions, Querier};
+
+/// Where balls are in some states: what a thread needs to screen.
+#[derive(Default)]
+pub(crate) struct Screening {
+    states: States,
+    /// The middles of balls in all states, row by row, and for which question they were placed.
+    points: Vec<Points>,
+    placed: Vec<u32>,
+    question: u32,
+    /// How each group moves, and whether one gets too far or turns too often for the roundings here.
+    moves: Vec<Move>,
+    is_far: bool,
+    /// Pairs that may come near, and in which steps, a bit each.
+    pub(crate) found: Vec<(usize, u64)>,
+    /// Pairs that are likely to touch, and a step: by how near their balls are, as a part of the radius.
+    likely: Vec<Likely>,
+}
+
+#[derive(Clone, Copy)]
+struct Likely {
+    share: f64,
+    pair: usize,
+    step: usize,
+}
+
+/// Bounds of the middles of a group's balls.
+#[derive(Clone, Copy, Default)]
+struct Move {
+    acceleration: f64,
+    rounding: f64,
+}
+
+/// The most steps of a motion: as many as a mask has bits.
+const MOST_STEPS: usize = 64;
+/// A step is short enough if the chord is off by this part of the radius of a small ball.
+const OFF: f64 = 0.4;
+/// Far more than the roundings of a step of a chain, of its sine and cosine, and of a ball's middle.
+const ROUNDING: f64 = 1.0 / (1u64 << 38) as f64;
+/// More than the relative error of arithmetic with bounds.
+const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
+/// Where the middle of a ball is so near to something, as a part of its radius, they may well touch.
+const LIKELY: f64 = 1.6;
+/// The same part where they surely do.
+const SURE: f64 = 0.8;
+/// The most pairs that are tested because of that.
+const MOST_LIKELY: usize = 64;
+/// Less than what roundings leave of a difference of products.
+const ROUNDED_DOWN: f64 = 1.0 - 1.0 / (1u64 << 46) as f64;
+/// Motions that reach farther are left to the questions about pairs, which refuse those that reach too far.
+const MOST_REACH: f64 = (1u128 << 100) as f64;
+/// So do motions of larger angles, in radians.
+const MOST_ANGLE: f64 = (1u64 << 30) as f64;
+/// How often a step's chord is cut where it is all that is left to cut.
+const CUTS: usize = 4;
+
+impl Screening {
+    /// Goes to the states between the steps of a motion. Returns the number of steps.
+    pub(crate) fn start(
+        &mut self,
+        screen: &Screen,
+        setting: &Setting,
+        edge: &Edge,
+        bounds: &[[Bounds; 2]],
+    ) -> usize {
+        let model = &*setting.model;
+        let fastest = self.follow(screen, model, bounds);
+        let short = OFF * screen.finest;
+        let mut steps = (0..=MOST_STEPS.ilog2()).map(|level| 1usize << level);
+        let steps =
+            steps.find(|steps| fastest / (8.0 * (steps * steps) as f64) <= short).unwrap_or(MOST_STEPS);
+        self.make_room(screen, model, steps + 1);
+        let time = |state: usize| state as f64 / steps as f64;
+        for (number, of) in edge.coefficients.iter().enumerate() {
+            self.states.set(number, |state| value(of, time(state)));
+        }
+        for joint in &model.joints {
+            if let Kind::Floating(first) = joint.kind {
+                let turning = Turning::of(edge, first);
+                for k in 0..4 {
+                    self.states.set(first + 3 + k, |state| turning.at(time(state))[k]);
+                }
+            }
+        }
+        self.states.place(model);
+        steps
+    }
+
+    /// Bounds how the groups move. Returns the largest acceleration.
+    fn follow(&mut self, screen: &Screen, model: &Model, bounds: &[[Bounds; 2]]) -> f64 {
+        self.moves.clear();
+        self.is_far = false;
+        let mut fastest = 0.0f64;
+        for group in 0..model.groups.len() {
+            let mut reach = screen.reach[group];
+            let (mut speed, mut of) = (0.0, Move { acceleration: 0.0, rounding: ROUNDING * reach });
+            for joint in model.above(group) {
+                let [turn, slide] = &bounds[joint];
+                of.acceleration += 2.0 * turn.rate * speed
+                    + (turn.rate * turn.rate + turn.acceleration) * reach
+                    + slide.acceleration;
+                speed += turn.rate * reach + slide.rate;
+                reach += length(model.joints[joint].origin.translation) + slide.way;
+                of.rounding += ROUNDING * (reach * (1.0 + turn.terms) + slide.terms);
+                self.is_far |= is_more(turn.terms, MOST_ANGLE);
+            }
+            of.acceleration *= ROUNDED_UP;
+            self.is_far |= is_more(reach, MOST_REACH);
+            fastest = fastest.max(of.acceleration);
+            self.moves.push(of);
+        }
+        fastest
+    }
+
+    /// Makes room for the balls in some states.
+    fn make_room(&mut self, screen: &Screen, model: &Model, states: usize) {
+        self.states.start(model, states);
+        self.points.resize(screen.balls.len() * self.states.rows, Points::default());
+        self.placed.resize(screen.balls.len(), 0);
+        self.question = self.question.wrapping_add(1);
+        if self.question == 0 {
+            self.placed.fill(0);
+            self.question = 1;
+        }
+    }
+}
+
+/// A question: a screen, and what it is asked about.
+pub(crate) struct Search<'a> {
+    screen: &'a Screen,
+    fields: &'a [Clearances],
+    setting: &'a Setting,
+    of: &'a mut Screening,
+    test: &'a mut dyn Test,
+    steps: usize,
+    /// What is added to a ball for what must stay clear.
+    limit: f64,
+}
+
+/// Who answers about shapes.
+pub(crate) trait Test {
+    fn querier(&mut self) -> &mut Querier;
+
+    /// Says whether a pair is a hit in the middle of a step.
+    fn is_hit(&mut self, pair: usize, step: usize) -> Result<bool, RobotError>;
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(
+        (screen, fields): (&'a Screen, &'a [Clearances]),
+        setting: &'a Setting,
+        of: &'a mut Screening,
+        test: &'a mut dyn Test,
+    ) -> Self {
+        of.found.clear();
+        let steps = (of.states.count - 1).max(1);
+        Self { screen, fields, setting, of, test, steps, limit: 0.0 }
+    }
+
+    /// Finds the pairs that may come within the clearance and the tolerance on a motion, and when, unless one of the pairs that are
+    /// likely to touch is a hit. Returns whether one is.
+    pub(crate) fn motion(&mut self, options: &MotionOptions) -> Result<bool, RobotError> {
+        let (screen, fields) = (self.screen, self.fields);
+        self.of.likely.clear();
+        let all = mask(0, self.steps);
+        if self.of.is_far || fields.iter().any(|field| is_more(field.farthest, MOST_REACH)) {
+            self.of.found.extend((0..self.setting.pairs.len()).map(|pair| (pair, all)));
+            return Ok(false);
+        }
+        // First, in which steps a part may come near something, whatever it is.
+        let mut near: Vec<(&Screened, &Clearances, u64)> = Vec::new();
+        // What is farther from the base is more likely to touch.
+        for of in screen.parts.iter().rev().filter(|of| !of.pairs.is_empty()) {
+            let Some(field) = of.field else {
+                self.of.found.extend(of.pairs.iter().map(|pair| (*pair, all)));
+                continue;
+            };
+            let field = &fields[field];
+            self.limit_of(of, options);
+            let mut steps = 0;
+            if self.field(of, field, of.root, [0, self.steps], &mut Near::Some(&mut steps))? {
+                return Ok(true);
+            }
+            if steps != 0 {
+                near.push((of, field, steps));
+            }
+        }
+        let MotionOptions { clearance, tolerance, .. } = *options;
+        for &number in &screen.mutual {
+            let pair = &self.setting.pairs[number];
+            let [a, b] = [pair.a, pair.b].map(|part| &screen.parts[part]);
+            let rounding = self.of.moves[a.group].rounding + self.of.moves[b.group].rounding;
+            let tolerance = tolerance.unwrap_or(a.tolerance.min(b.tolerance));
+            self.limit = (clearance + tolerance + rounding) * ROUNDED_UP;
+            if self.stay_apart([a, b]) {
+                continue;
+            }
+            let mut steps = 0;
+            let quarter = (self.steps / 4).max(1);
+            for first in (0..self.steps).step_by(quarter) {
+                self.mutual(
+                    number,
+                    [a.group, b.group],
+                    [a.root, b.root],
+                    [first, first + quarter],
+                    &mut steps,
+                );
+            }
+            if steps != 0 {
+                self.of.found.push((number, steps));
+            }
+        }
+        let mut likely = std::mem::take(&mut self.of.likely);
+        likely.sort_unstable_by(|a, b| {
+            a.share.total_cmp(&b.share).then((a.pair, a.step).cmp(&(b.pair, b.step)))
+        });
+        for Likely { pair, step, .. } in likely.iter().take(MOST_LIKELY) {
+            if self.test.is_hit(*pair, *step)? {
+                return Ok(true);
+            }
+        }
+        self.of.likely = likely;
+        // Now what it comes near.
+        for (of, field, steps) in near {
+            self.limit_of(of, options);
+            let first = self.of.found.len();
+            self.field(of, field, of.root, [0, self.steps], &mut Near::All { steps, first })?;
+        }
+        Ok(false)
+    }
+
+    /// Sets the limit for a part against what stands still.
+    fn limit_of(&mut self, of: &Screened, options: &MotionOptions) {
+        let rounding = self.of.moves[of.group].rounding;
+        self.limit = (options.clearance + options.tolerance.unwrap_or(of.tolerance) + rounding) * ROUNDED_UP;
+    }
+
+    /// Returns whether the balls around two parts are so far apart in the middle of the motion that they never meet.
+    #[inline]
+    fn stay_apart(&mut self, parts: [&Screened; 2]) -> bool {
+        let [a, b] = parts.map(|part| {
+            self.place(part.group, part.root);
+            self.at(part.root, self.steps / 2)
+        });
+        let reach: f64 =
+            parts.map(|part| self.screen.balls[part.root].radius + self.extent(part)).iter().sum();
+        apart(&a, &b) > (reach + self.limit) * ROUNDED_UP
+    }
+
+    /// Returns how far the middle of the ball around a part is at most from where it is in the middle of the motion.
+    fn extent(&self, part: &Screened) -> f64 {
+        let middle = self.at(part.root, self.steps / 2);
+        let way = [0, self.steps].map(|state| apart(&self.at(part.root, state), &middle));
+        way[0].max(way[1]) * ROUNDED_UP + self.off(part.group, (self.steps as f64 / 2.0).max(1.0))
+    }
+
+    /// Places a ball in all states.
+    #[inline]
+    fn place(&mut self, group: usize, ball: usize) {
+        if self.of.placed[ball] != self.of.question {
+            self.of.placed[ball] = self.of.question;
+            let rows = self.of.states.rows;
+            let to = &mut self.of.points[ball * rows..][..rows];
+            self.of.states.points(group, self.screen.balls[ball].centre, to);
+        }
+    }
+
+    #[inline]
+    fn at(&self, ball: usize, state: usize) -> Point {
+        let points = &self.of.points[ball * self.of.states.rows + state / LANES];
+        each(|k| points[k][state % LANES])
+    }
+
+    /// Returns how far a path is at most from the chord of some steps.
+    fn off(&self, group: usize, steps: f64) -> f64 {
+        let time = steps / self.steps as f64;
+        self.of.moves[group].acceleration * (time * time / 8.0)
+    }
+
+    /// Finds the steps in which a ball may come near what stands still.
+    fn field(
+        &mut self,
+        of: &Screened,
+        field: &Clearances,
+        ball: usize,
+        [from, to]: [usize; 2],
+        near: &mut Near<'_>,
+    ) -> Result<bool, RobotError> {
+        let steps = mask(from, to);
+        match near {
+            Near::Some(held) if **held & steps == steps => return Ok(false),
+            Near::All { steps: of, .. } if *of & steps == 0 => return Ok(false),
+            _ => {}
+        }
+        self.place(of.group, ball);
+        let Ball { radius, children, .. } = self.screen.balls[ball];
+        let [start, end] = [from, to].map(|state| self.at(ball, state));
+        let is_step = to - from == 1;
+        let (middle, off) = if is_step {
+            (between(&start, &end, 0.5), self.off(of.group, 1.0))
+        } else {
+            (self.at(ball, from.midpoint(to)), self.off(of.group, (to - from) as f64 / 2.0))
+        };
+        let extent = apart(&start, &middle).max(apart(&end, &middle)) * ROUNDED_UP + off;
+        let need = radius + self.limit;
+        if field.is_beyond(self.setting, self.test.querier(), &middle, need + extent) {
+            return Ok(false);
+        }
+        let children = children as usize;
+        if children != 0 && (radius > extent || is_step) {
+            return Ok(self.field(of, field, children, [from, to], near)?
+                || self.field(of, field, children + 1, [from, to], near)?);
+        }
+        if !is_step && extent > 0.0 {
+            let half = from.midpoint(to);
+            return Ok(self.field(of, field, ball, [half, to], near)?
+                || self.field(of, field, ball, [from, half], near)?);
+        }
+        let is_clear = extent > 0.25 * radius && {
+            let piece = need + extent / CUTS as f64 + off;
+            (0..CUTS).all(|cut| {
+                let at = between(&start, &end, (cut as f64 + 0.5) / CUTS as f64);
+                field.is_beyond(self.setting, self.test.querier(), &at, piece)
+            })
+        };
+        if is_clear {
+            return Ok(false);
+        }
+        let Screening { found, likely, .. } = &mut *self.of;
+        match near {
+            Near::Some(held) => {
+                **held |= steps;
+                let mut deepest: Option<(f64, usize)> = None;
+                field.near(&middle, LIKELY * radius, |place, away| {
+                    let share = away / radius;
+                    likely.push(Likely { share, pair: of.pairs[place], step: from });
+                    if deepest.is_none_or(|(held, _)| share < held) {
+                        deepest = Some((share, of.pairs[place]));
+                    }
+                });
+                match deepest {
+                    Some((share, pair)) if share < SURE => self.test.is_hit(pair, from),
+                    _ => Ok(false),
+                }
+            }
+            Near::All { first, .. } => {
+                field.near(&middle, need + extent, |place, _| {
+                    let pair = of.pairs[place];
+                    match found[*first..].iter_mut().find(|held| held.0 == pair) {
+                        Some(held) => held.1 |= steps,
+                        None => found.push((pair, steps)),
+                    }
+                });
+                Ok(false)
+            }
+        }
+    }
+
+    /// Marks the steps in which two balls may come near each other.
+    fn mutual(
+        &mut self,
+        pair: usize,
+        groups: [usize; 2],
+        balls: [usize; 2],
+        [from, to]: [usize; 2],
+        near: &mut u64,
+    ) {
+        let steps = mask(from, to);
+        if *near & steps == steps {
+            return;
+        }
+        for side in 0..2 {
+            self.place(groups[side], balls[side]);
+        }
+        let way = |state: usize| {
+            let [a, b] = balls.map(|ball| self.at(ball, state));
+            each(|k| b[k] - a[k])
+        };
+        let [start, end] = [way(from), way(to)];
+        let [a, b] = balls.map(|ball| self.screen.balls[ball]);
+        let time = (to - from) as f64;
+        let off = self.off(groups[0], time) + self.off(groups[1], time);
+        let radii = a.radius + b.radius;
+        let need = (radii + self.limit + off) * ROUNDED_UP;
+        if is_beyond(&start, &end, need) {
+            return;
+        }
+        let is_step = to - from == 1;
+        match larger(&a, &b) {
+            Some(side) if is_step || off < 0.5 * radii => {
+                let children = [a, b][side].children as usize;
+                for child in [children, children + 1] {
+                    let mut balls = balls;
+                    balls[side] = child;
+                    self.mutual(pair, groups, balls, [from, to], near);
+                }
+            }
+            _ if !is_step && (off > 0.0 || start != end) => {
+                let middle = from.midpoint(to);
+                for ends in [[from, middle], [middle, to]] {
+                    self.mutual(pair, groups, balls, ends, near);
+                }
+            }
+            _ => {
+                *near |= steps;
+                let share = length(between(&start, &end, 0.5)) / radii;
+                if share < LIKELY {
+                    self.of.likely.push(Likely { share, pair, step: from });
+                }
+            }
+        }
+    }
+}
+
+/// What is looked for of a part that may come near what stands still.
+enum Near<'a> {
+    /// The steps in which it comes near something, until a test of what surely touches says that it does.
+    Some(&'a mut u64),
+    /// What it comes near in these steps. Pairs of the part are found from a place on.
+    All { steps: u64, first: usize },
+}
+
+/// Returns which of two balls to divide; none if neither has children.
+fn larger(a: &Ball, b: &Ball) -> Option<usize> {
+    match [a, b].map(|ball| ball.children != 0) {
+        [false, false] => None,
+        [true, false] => Some(0),
+        [false, true] => Some(1),
+        [true, true] => Some(usize::from(b.radius > a.radius)),
+    }
+}
+
+/// Returns whether a number is more than another one, or none.
+fn is_more(number: f64, than: f64) -> bool {
+    number > than || number.is_nan()
+}
+
+/// Returns a bit for each step.
+pub(crate) fn mask(from: usize, to: usize) -> u64 {
+    u64::MAX >> (64 - (to - from)) << from
+}
+
+fn between(a: &Point, b: &Point, share: f64) -> Point {
+    each(|k| a[k] + share * (b[k] - a[k]))
+}
+
+fn apart(a: &Point, b: &Point) -> f64 {
+    length(each(|k| a[k] - b[k]))
+}
+
+/// Returns whether the segment between two points is farther from the origin than a distance.
+#[inline]
+fn is_beyond(a: &Point, b: &Point, distance: f64) -> bool {
+    let way = each(|k| b[k] - a[k]);
+    let dot = |p: &Point, q: &Point| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    let (squared, along, long) = (distance * distance, -dot(a, &way), dot(&way, &way));
+    // The nearest point is the start, the end, or between both.
+    let (height, limit) = if along <= 0.0 {
+        (dot(a, a), squared)
+    } else if along >= long {
+        (dot(b, b), squared)
+    } else {
+        (dot(a, a) * long * ROUNDED_DOWN - along * along, squared * long)
+    };
+    height > limit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::edge::bounds;
+    use crate::options::Base;
+    use crate::pair_path::{JointPaths, PairPath};
+    use crate::testing::{robot, tree, values};
+    use bvh_bake::{Options, shapes, to_bytes};
+    use bvh_query::{Bvh, OwnedShape, Pose, RigidPath};
+    use cbvh_testkit::Random;
+
+    /// Nothing is a hit.
+    struct Nothing(Querier);
+
+    impl Test for Nothing {
+        fn querier(&mut self) -> &mut Querier {
+            &mut self.0
+        }
+
+        fn is_hit(&mut self, _: usize, _: usize) -> Result<bool, RobotError> {
+            Ok(false)
+        }
+    }
+
+    /// What the screen leaves out is farther apart than the limit, at all of many moments.
+    #[test]
+    fn what_is_left_out_stays_apart() {
+        let random = &mut Random::new(53);
+        let mut querier = Querier::new().unwrap();
+        let (mut left_out, mut kept, mut closest) = (0, 0, f64::INFINITY);
+        for round in 0..60 {
+            let base = [Base::Fixed, Base::Planar, Base::Floating][round % 3];
+            let mut robot = robot(&tree(random, 3 + round % 7), base);
+            for number in 0..random.below(5) {
+                let sides = [(); 3].map(|()| 0.02 + 0.4 * random.unit());
+                let (bytes, _) = to_bytes(&shapes::block(sides).unwrap(), &Options::default()).unwrap();
+                let shape = OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).solid().unwrap();
+                let pose = Pose::from_quaternion(random.quaternion(), random.point()).unwrap();
+                robot.add_obstacle(format!("block{number}"), shape, &pose).unwrap();
+            }
+            robot.refresh();
+            let far = [0.3, 1.0, 3.0][random.below(3)];
+            let [mut from, mut to] = [(); 2].map(|()| values(random, &robot, far));
+            // Far round, where a joint can be.
+            let whole = [0.0, 0.0, 0.0, 1e4, 1e8, 1e17][random.below(6)];
+            if base == Base::Fixed {
+                from.iter_mut().chain(&mut to).for_each(|value| *value += whole);
+            }
+            let share = [0.0, 1.0, 0.03, 1.0][round % 4];
+            to = from.iter().zip(&to).map(|(from, to)| from + share * (to - from)).collect();
+            let mut edge = Edge::straight(&from, &to).unwrap();
+            if round % 5 == 1 && base != Base::Floating {
+                edge.coefficients
+                    .iter_mut()
+                    .for_each(|of| of.extend([random.signed(), 0.5 * random.signed()]));
+            }
+            let mut options = MotionOptions::default();
+            options.clearance = [0.0, 0.0, 0.05][random.below(3)];
+            let setting = &*robot.setting;
+            let bounds = bounds(&setting.model, &edge);
+            let screen = robot.screens.of(setting, &mut querier).unwrap();
+            let mut screening = Screening::default();
+            let steps = screening.start(screen.0, setting, &edge, &bounds);
+            let asked = &mut Nothing(Querier::new().unwrap());
+            Search::new(screen, setting, &mut screening, asked).motion(&options).unwrap();
+            let joints = JointPaths::new(&setting.model, &edge, &bounds);
+            for (number, pair) in setting.pairs.iter().enumerate() {
+                let near = screening.found.iter().find(|found| found.0 == number).map_or(0, |found| found.1);
+                let path = PairPath::new(setting, pair, &joints).unwrap();
+                let limit = options.clearance + options.tolerance_between(&path.a.shape, &path.b.shape);
+                for step in 0..steps {
+                    if near >> step & 1 == 1 {
+                        kept += 1;
+                        continue;
+                    }
+                    left_out += 1;
+                    for share in [0.0, 0.3, 0.5, 0.8, 1.0] {
+                        let pose = path.pose((step as f64 + share) / steps as f64);
+                        let apart = querier.distance(&path.a.shape, &path.b.shape, &pose).unwrap().lower;
+                        assert!(apart > limit, "round {round}, pair {number}, step {step}: {apart} {limit}");
+                        closest = closest.min((apart - limit) / path.reach);
+                    }
+                }
+            }
+        }
+        assert!(left_out > 20_000 && kept > 200, "{left_out} {kept}");
+        assert!(closest < 0.1, "{closest}");
+    }
+}
