@@ -134,6 +134,9 @@ impl Robot {
     ) -> PyResult<Vec<T>> {
         detached(py, || {
             self.ask(|robot| {
+                for (row, joints) in rows.iter().enumerate().filter(|_| rows.len() > 1) {
+                    robot.check(joints).map_err(|source| robot_error(in_row(row, source)))?;
+                }
                 let parallel = parallel && rows.iter().all(|row| !row.is_empty());
                 in_turns(rows, if parallel { 8192 } else { 64 }, |rows| {
                     if parallel {
@@ -151,6 +154,10 @@ fn rows(values: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec<f64>>> {
     let (count, width) = values.as_array().dim();
     let flat = values.as_slice()?;
     Ok((0..count).map(|row| flat[row * width..][..width].to_vec()).collect())
+}
+
+fn in_row(row: usize, source: RobotError) -> RobotError {
+    RobotError::Row { row, source: Box::new(source) }
 }
 
 fn base_of(name: &str) -> Base {
@@ -581,6 +588,9 @@ impl Robot {
         let (edges, options) = (edges(&from, &to)?, options(clearance, tolerance));
         let free = detached(py, || {
             self.ask(|robot| {
+                for (row, edge) in edges.iter().enumerate().filter(|_| edges.len() > 1) {
+                    robot.check_edge(edge).map_err(|source| robot_error(in_row(row, source)))?;
+                }
                 in_turns(&edges, if parallel { 256 } else { 1 }, |edges| {
                     if parallel {
                         return on_pool(|| robot.are_free(edges, &options))?.map_err(robot_error);

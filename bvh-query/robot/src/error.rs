@@ -120,6 +120,14 @@ pub enum RobotError {
         /// The number.
         found: f64,
     },
+    /// A configuration or motion among many has invalid numbers.
+    #[error("row {row}: {source}")]
+    Row {
+        /// Its number, from 0.
+        row: usize,
+        /// What is wrong with it.
+        source: Box<Self>,
+    },
     /// A pose is not rigid, or too far away.
     #[error(transparent)]
     Pose(#[from] PoseError),
@@ -147,6 +155,18 @@ pub enum RobotError {
     /// `CBVH_ISA` names no backend that there is.
     #[error(transparent)]
     Backend(#[from] BackendError),
+}
+
+impl RobotError {
+    /// Names the row, if its numbers are to blame.
+    pub(crate) fn in_row(self, row: usize) -> Self {
+        match self {
+            Self::Count { .. } | Self::Value { .. } | Self::Pose(_) => {
+                Self::Row { row, source: Box::new(self) }
+            }
+            other => other,
+        }
+    }
 }
 
 /// Joins paths with commas.

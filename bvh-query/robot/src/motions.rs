@@ -89,7 +89,7 @@ impl Robot {
     /// Returns whether each of many motions is certainly free. Uses all threads of the rayon pool in which it is called.
     ///
     /// # Errors
-    /// The errors of [`Robot::is_free`], of the first motion that has one.
+    /// The errors of [`Robot::is_free`], of the first motion that has one, with [`RobotError::Row`] around those of its numbers.
     pub fn are_free(&mut self, edges: &[Edge], options: &MotionOptions) -> Result<Vec<bool>, RobotError> {
         self.many_edges(edges, |asker, known, edge| asker.is_free(known, edge, options))
     }
@@ -101,9 +101,16 @@ impl Robot {
         ask: impl Fn(&mut Asker, (&Setting, &Screens), &Edge) -> Result<R, RobotError> + Sync,
     ) -> Result<Vec<R>, RobotError> {
         self.refresh();
-        let (known, asker) = ((&*self.setting, &*self.screens), &self.asker);
+        let known = (&*self.setting, &*self.screens);
         let ask = |asker: &mut Asker, edge: &Edge| ask(asker, known, edge);
-        edges.par_iter().map_init(|| asker.clone(), ask).collect::<Vec<_>>().into_iter().collect()
+        let named = |(row, answer): (usize, Result<R, RobotError>)| answer.map_err(|error| error.in_row(row));
+        if rayon::current_num_threads() == 1 {
+            let asker = &mut self.asker;
+            return edges.iter().map(|edge| ask(asker, edge)).enumerate().map(named).collect();
+        }
+        let asker = &self.asker;
+        let answers: Vec<_> = edges.par_iter().map_init(|| asker.clone(), ask).collect();
+        answers.into_iter().enumerate().map(named).collect()
     }
 
     /// Returns an error unless a motion is one of this robot: with a polynomial for each joint value, valid ends, and turns at no more
@@ -132,7 +139,7 @@ impl Robot {
     /// Returns for each of many motions what [`Robot::motion`] does. Uses all threads of the rayon pool in which it is called.
     ///
     /// # Errors
-    /// The errors of [`Robot::is_free`], of the first motion that has one.
+    /// The errors of [`Robot::is_free`], of the first motion that has one, with [`RobotError::Row`] around those of its numbers.
     pub fn motions(
         &mut self,
         edges: &[Edge],

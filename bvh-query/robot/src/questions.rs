@@ -122,8 +122,8 @@ impl Robot {
     /// pool in which it is called; the answers do not depend on their number.
     ///
     /// # Errors
-    /// The errors of [`Robot::collide`], for the first configuration that has one; [`RobotError::Count`] also if the numbers are
-    /// no whole number of configurations.
+    /// The errors of [`Robot::collide`], for the first configuration that has one, with [`RobotError::Row`] around those of its numbers;
+    /// [`RobotError::Count`] if the numbers are no whole number of configurations.
     pub fn collide_many(&mut self, joints: &[f64]) -> Result<Vec<bool>, RobotError> {
         self.many(joints, Asker::collide)
     }
@@ -167,7 +167,18 @@ impl Robot {
         if expected == 0 || !joints.len().is_multiple_of(expected) {
             return Err(RobotError::Count { expected, found: joints.len() });
         }
-        let (setting, asker) = (&*self.setting, &self.asker);
+        let named = |(row, answer): (usize, Result<R, RobotError>)| answer.map_err(|error| error.in_row(row));
+        let setting = &*self.setting;
+        if rayon::current_num_threads() == 1 {
+            let asker = &mut self.asker;
+            return joints
+                .chunks(expected)
+                .map(|joints| ask(asker, setting, joints))
+                .enumerate()
+                .map(named)
+                .collect();
+        }
+        let asker = &self.asker;
         // Long runs, so that an asker remembers what is near.
         let run = (joints.len() / expected).div_ceil(4 * rayon::current_num_threads()).clamp(1, 256);
         let answers: Vec<Vec<Result<R, RobotError>>> = joints
@@ -177,7 +188,7 @@ impl Robot {
                 |asker, run| run.chunks(expected).map(|joints| ask(asker, setting, joints)).collect(),
             )
             .collect();
-        answers.into_iter().flatten().collect()
+        answers.into_iter().flatten().enumerate().map(named).collect()
     }
 
     /// Lets pairs touch that nearly always do: those that are in contact in at least this share of some random configurations

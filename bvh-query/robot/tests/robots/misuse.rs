@@ -93,7 +93,19 @@ fn numbers_that_no_joint_can_have_are_refused() {
     assert!(matches!(robot.collide_many(&[0.0; 3]), Ok(answers) if answers.len() == 3));
     for bad in [f64::NAN, f64::INFINITY] {
         assert!(matches!(robot.collide(&[bad]), Err(RobotError::Value { .. })));
-        assert!(matches!(robot.collide_many(&[0.0, bad]), Err(RobotError::Value { .. })));
+        for threads in [1, 3] {
+            // A bad row among good ones is named, however many threads ask.
+            cbvh_testkit::here::pool(threads).install(|| {
+                let error = robot.collide_many(&[0.0, 0.1, bad, bad]).unwrap_err();
+                assert!(matches!(&error, RobotError::Row { row: 2, source } if matches!(**source, RobotError::Value { .. })));
+                assert!(error.to_string().starts_with("row 2: joint j: expected a finite value, found "));
+                let edges = [0.0, bad].map(|to| Edge::straight(&[0.0], &[to]).unwrap());
+                let free = robot.are_free(&edges, &MotionOptions::new());
+                assert!(matches!(free, Err(RobotError::Row { row: 1, .. })));
+                let wrong = [Edge::polynomials(vec![]), edges[0].clone()];
+                assert!(matches!(robot.motions(&wrong, &MotionOptions::new()), Err(RobotError::Row { row: 0, .. })));
+            });
+        }
         assert!(matches!(robot.is_free(&[0.0], &[bad]), Err(RobotError::Value { .. })));
         assert!(matches!(robot.link_poses(&[bad]), Err(RobotError::Value { .. })));
     }
