@@ -86,7 +86,7 @@ impl Clearances {
         point: &Point,
         distance: f64,
     ) -> bool {
-        let scaled = point.map(|x| x * self.inverse);
+        let scaled = each(|k| point[k] * self.inverse);
         // NaN and infinite points are not within it.
         if !scaled.iter().all(|x| x.abs() < MOST_CELLS) {
             return self.distance_of_bounds(point).0 > distance;
@@ -199,8 +199,8 @@ impl Cell {
     /// Returns the cell that a point is in, given in small cells.
     #[inline]
     fn at<const LEVEL: u32>(scaled: &Point) -> Self {
-        let at = scaled.map(|x| {
-            let x = x * (1.0 / (1u32 << LEVEL) as f64);
+        let at = each(|k| {
+            let x = scaled[k] * (1.0 / (1u32 << LEVEL) as f64);
             // Rounded towards zero, and then down.
             let whole = x as i32;
             whole - i32::from(f64::from(whole) > x)
@@ -211,7 +211,7 @@ impl Cell {
     /// Returns its place in the table, a block and one in it, and what tells it from others with this place, and from none.
     #[inline]
     fn place(&self) -> ([usize; 2], u64) {
-        let at = self.at.map(|x| x as u32);
+        let at = each(|k| self.at[k] as u32);
         let bits = |from: u32, count: u32| {
             let of = |k: usize| u64::from(at[k] >> from & ((1 << count) - 1)) << (k as u32 * count);
             of(0) | of(1) | of(2)
@@ -222,7 +222,7 @@ impl Cell {
     #[inline]
     fn middle(&self, side: f64) -> Point {
         let side = if self.is_large { side * f64::from(1u32 << LARGE) } else { side };
-        self.at.map(|x| (f64::from(x) + 0.5) * side)
+        each(|k| (f64::from(self.at[k]) + 0.5) * side)
     }
 
     /// Returns a lower bound at a point of the cell, given the one that is held.

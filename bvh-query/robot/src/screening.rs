@@ -19,6 +19,8 @@ pub(crate) struct Screening {
     points: Vec<Points>,
     placed: Vec<u32>,
     question: u32,
+    /// Where the balls around parts are in the middle, and how far from there they and their middles reach.
+    middles: Vec<(Point, f64)>,
     /// How each group moves, and whether one gets too far or turns too often for the roundings here.
     moves: Vec<Move>,
     is_far: bool,
@@ -197,13 +199,15 @@ impl<'a> Search<'a> {
             }
         }
         let MotionOptions { clearance, tolerance, .. } = *options;
+        self.find_middles();
         for &number in &screen.mutual {
             let pair = &self.setting.pairs[number];
             let [a, b] = [pair.a, pair.b].map(|part| &screen.parts[part]);
             let rounding = self.of.moves[a.group].rounding + self.of.moves[b.group].rounding;
             let tolerance = tolerance.unwrap_or(a.tolerance.min(b.tolerance));
             self.limit = (clearance + tolerance + rounding) * ROUNDED_UP;
-            if self.stay_apart([a, b]) {
+            let [from, to] = [pair.a, pair.b].map(|part| self.of.middles[part]);
+            if apart(&from.0, &to.0) > (from.1 + to.1 + self.limit) * ROUNDED_UP {
                 continue;
             }
             let mut steps = 0;
@@ -246,23 +250,22 @@ impl<'a> Search<'a> {
         self.limit = (options.clearance + options.tolerance.unwrap_or(of.tolerance) + rounding) * ROUNDED_UP;
     }
 
-    /// Returns whether the balls around two parts are so far apart in the middle of the motion that they never meet.
-    #[inline]
-    fn stay_apart(&mut self, parts: [&Screened; 2]) -> bool {
-        let [a, b] = parts.map(|part| {
+    /// Finds where the middles of the balls around all parts are in the middle of the motion, and how far they get from there at most.
+    fn find_middles(&mut self) {
+        self.of.middles.clear();
+        for part in &self.screen.parts {
+            // An obstacle has none.
+            if part.root == self.screen.balls.len() {
+                self.of.middles.push(([0.0; 3], f64::INFINITY));
+                continue;
+            }
             self.place(part.group, part.root);
-            self.at(part.root, self.steps / 2)
-        });
-        let reach: f64 =
-            parts.map(|part| self.screen.balls[part.root].radius + self.extent(part)).iter().sum();
-        apart(&a, &b) > (reach + self.limit) * ROUNDED_UP
-    }
-
-    /// Returns how far the middle of the ball around a part is at most from where it is in the middle of the motion.
-    fn extent(&self, part: &Screened) -> f64 {
-        let middle = self.at(part.root, self.steps / 2);
-        let way = [0, self.steps].map(|state| apart(&self.at(part.root, state), &middle));
-        way[0].max(way[1]) * ROUNDED_UP + self.off(part.group, (self.steps as f64 / 2.0).max(1.0))
+            let middle = self.at(part.root, self.steps / 2);
+            let way = [0, self.steps].map(|state| apart(&self.at(part.root, state), &middle));
+            let off = self.off(part.group, (self.steps as f64 / 2.0).max(1.0));
+            let reach = self.screen.balls[part.root].radius + way[0].max(way[1]) * ROUNDED_UP + off;
+            self.of.middles.push((middle, reach));
+        }
     }
 
     /// Places a ball in all states.
@@ -305,7 +308,7 @@ impl<'a> Search<'a> {
         }
         self.place(of.group, ball);
         let Ball { radius, children, .. } = self.screen.balls[ball];
-        let [start, end] = [from, to].map(|state| self.at(ball, state));
+        let (start, end) = (self.at(ball, from), self.at(ball, to));
         let is_step = to - from == 1;
         let (middle, off) = if is_step {
             (between(&start, &end, 0.5), self.off(of.group, 1.0))
@@ -384,11 +387,11 @@ impl<'a> Search<'a> {
             self.place(groups[side], balls[side]);
         }
         let way = |state: usize| {
-            let [a, b] = balls.map(|ball| self.at(ball, state));
+            let (a, b) = (self.at(balls[0], state), self.at(balls[1], state));
             each(|k| b[k] - a[k])
         };
         let [start, end] = [way(from), way(to)];
-        let [a, b] = balls.map(|ball| self.screen.balls[ball]);
+        let (a, b) = (self.screen.balls[balls[0]], self.screen.balls[balls[1]]);
         let time = (to - from) as f64;
         let off = self.off(groups[0], time) + self.off(groups[1], time);
         let radii = a.radius + b.radius;

@@ -2,7 +2,7 @@
 //!
 //! These places only serve filters. They are off by some roundings more than those of [`Model::place`], which filters charge.
 
-use crate::frame::Frame;
+use crate::frame::{Frame, each};
 use crate::lanes::in_lanes;
 use crate::model::{Kind, Model, Value};
 
@@ -69,14 +69,14 @@ impl States {
                 };
                 self.frames[joint.child * rows + row] = match &joint.kind {
                     Kind::Turn { by, turns, .. } => {
-                        parent.of(&turned(turns, &value(by)), &joint.origin.translation.map(|x| [x; LANES]))
+                        parent.of(&turned(turns, &value(by)), &each(|k| [joint.origin.translation[k]; LANES]))
                     }
                     Kind::Slide { by, axis } => {
                         let Frame { rotation, translation } = joint.origin;
                         let axis = Frame { rotation, translation: [0.0; 3] }.place(*axis);
                         let way = value(by);
-                        let at = [0, 1, 2].map(|k| lanes(|lane| translation[k] + way[lane] * axis[k]));
-                        parent.of(&rotation.map(|row| row.map(|x| [x; LANES])), &at)
+                        let at = each(|k| lanes(|lane| translation[k] + way[lane] * axis[k]));
+                        parent.of(&each(|i| each(|j| [rotation[i][j]; LANES])), &at)
                     }
                     Kind::Planar(_) | Kind::Floating(_) => {
                         let numbers = &self.numbers;
@@ -96,7 +96,7 @@ impl States {
     pub(crate) fn points(&self, group: usize, point: [f64; 3], to: &mut [Points]) {
         in_lanes(|| {
             for (frames, to) in self.frames[group * self.rows..][..self.rows].iter().zip(to) {
-                *to = frames.place(&point.map(|x| [x; LANES]));
+                *to = frames.place(&each(|k| [point[k]; LANES]));
             }
         });
     }
@@ -119,7 +119,7 @@ impl Frames {
                     + self.translation[k][lane]
             })
         };
-        [of(0), of(1), of(2)]
+        each(of)
     }
 
     /// Returns these frames with others in front of them.
@@ -133,7 +133,7 @@ impl Frames {
                     + row[2][lane] * rotation[2][j][lane]
             })
         };
-        let rotation = [0, 1, 2].map(|i| [of(i, 0), of(i, 1), of(i, 2)]);
+        let rotation = each(|i| each(|j| of(i, j)));
         Self { rotation, translation: self.place(translation) }
     }
 
@@ -174,7 +174,7 @@ fn turned([still, first, second]: &[[[f64; 3]; 3]; 3], angles: &Row) -> [[Row; 3
     let of = |i: usize, j: usize| {
         lanes(|lane| still[i][j] + sines[lane] * first[i][j] + (1.0 - cosines[lane]) * second[i][j])
     };
-    [0, 1, 2].map(|i| [of(i, 0), of(i, 1), of(i, 2)])
+    each(|i| each(|j| of(i, j)))
 }
 
 /// Returns the sine and the cosine of an angle of up to a million radians, to within 2^-42, without a branch, so that lanes are
