@@ -4,8 +4,9 @@
     python examples/ompl_arm.py
 
 `cbvh.Robot` answers OMPL's two questions: whether a state is valid, and whether a motion is. RRT-Connect and PRM plan with
-both. Then OMPL's own validator, which looks at states at intervals of 1 % and 0.1 % of the extent of the space, is asked
-about random edges: it accepts some that touch, and for each of them a configuration in contact is shown.
+both. Then OMPL's own validator, which looks at states at intervals of 1 % and 0.1 % of the extent of the space, checks
+random edges: it accepts some that touch, and for each of them a configuration in contact is shown. `Robot.is_free` checks
+all of these edges in one call, with the answers that the validator gives one by one.
 """
 
 import numpy as np
@@ -21,11 +22,21 @@ EDGES = 1000
 
 
 class Checker:
-    """Asks about states of OMPL: the joint values of a group, while the others keep theirs."""
+    """Checks states of OMPL: the joint values of a group, while the others keep theirs."""
 
     def __init__(self, robot, group):
         self.robot, self.still = robot, robot.q()
         self.places = [robot.joints.index(name) for name in robot.groups[group]]
+
+    def space(self):
+        """The box of the joints' limits."""
+        space = base.RealVectorStateSpace(len(self.places))
+        bounds = base.RealVectorBounds(len(self.places))
+        for place, (low, high) in enumerate(np.clip(self.robot.limits[self.places], -np.pi, np.pi)):
+            bounds.setLow(place, low)
+            bounds.setHigh(place, high)
+        space.setBounds(bounds)
+        return space
 
     def q(self, state):
         q = self.still.copy()
@@ -47,6 +58,13 @@ class Certified(base.MotionValidator):
         return self.checker.robot.is_free(self.checker.q(start), self.checker.q(end))
 
 
+def state_of(information, values):
+    state = information.allocState()
+    for place, value in enumerate(values):
+        state[place] = value
+    return state
+
+
 def plan(setup, planner, start, goal):
     """Plans and shortens a path. Returns its configurations as OMPL's states."""
     setup.setPlanner(planner)
@@ -63,26 +81,14 @@ def main():
     util.RNG.setSeed(1)
     robot = arm_in_cell(ARM)
     checker = Checker(robot, GROUP)
-    space = base.RealVectorStateSpace(len(checker.places))
-    bounds = base.RealVectorBounds(len(checker.places))
-    for place, (low, high) in enumerate(np.clip(robot.limits[checker.places], -np.pi, np.pi)):
-        bounds.setLow(place, low)
-        bounds.setHigh(place, high)
-    space.setBounds(bounds)
-    setup = geometric.SimpleSetup(space)
+    setup = geometric.SimpleSetup(checker.space())
     setup.setStateValidityChecker(checker.is_valid)
     information = setup.getSpaceInformation()
     discrete, certified = information.getMotionValidator(), Certified(information, checker)
     information.setMotionValidator(certified)
     information.setup()
 
-    def state_of(values):
-        state = information.allocState()
-        for place, value in enumerate(values):
-            state[place] = value
-        return state
-
-    start, goal = state_of(START), state_of(GOAL)
+    start, goal = state_of(information, START), state_of(information, GOAL)
     for planner in (geometric.RRTConnect(information), geometric.PRM(information)):
         q = np.array([checker.q(state) for state in plan(setup, planner, start, goal)])
         assert robot.is_free(q[:-1], q[1:]).all()
@@ -93,9 +99,12 @@ def main():
     starts = rng.uniform(low, high, (4 * EDGES, len(low)))
     ends = rng.uniform(low, high, starts.shape)
     ends[::2] = starts[::2] + 0.1 * (ends[::2] - starts[::2])
-    edges = [(state_of(start), state_of(end)) for start, end in zip(starts, ends)]
+    edges = [(state_of(information, start), state_of(information, end)) for start, end in zip(starts, ends)]
     edges = [edge for edge in edges if all(map(information.isValid, edge))][:EDGES]
-    is_free = np.array([certified.checkMotion(*edge) for edge in edges])
+    # All of them in one call, on all cores, and then one by one, as OMPL does it.
+    q0, q1 = (np.array([checker.q(edge[end]) for edge in edges]) for end in (0, 1))
+    is_free = robot.is_free(q0, q1, parallel=True)
+    assert is_free.tolist() == [certified.checkMotion(*edge) for edge in edges]
     for share in (0.01, 0.001):
         information.setStateValidityCheckingResolution(share)
         information.setup()

@@ -4,8 +4,8 @@
     python examples/ompl_planner.py
 
 The checker of states asks `Mesh.within`, and the validator of motions asks `Mesh.is_free`. RRT-Connect brings the
-robot of testdata from one end of its environment to the other. Each edge is then asked about again, and compared with
-the states that OMPL interpolates. The same is done with OMPL's own validator, which looks at states at intervals, and
+robot of testdata from one end of its environment to the other. All edges of a path are then checked again in one call,
+and compared with the states that OMPL interpolates. The same is done with OMPL's own validator, which looks at states at intervals, and
 may accept edges that come too near to a wall.
 """
 
@@ -70,7 +70,9 @@ def plan(setup, walls, robot):
     states = path.getStates()
     poses = np.array([pose_of(state) for state in states])
     edges = cbvh.Motion.between(poses[:-1], poses[1:])
-    is_free = walls.motion(robot, edges, clearance=CLEARANCE).kind == cbvh.MotionKind.FREE
+    # All edges in one call, and then one by one, as the validator checks them.
+    is_free = walls.is_free(robot, edges, clearance=CLEARANCE)
+    assert is_free.tolist() == [walls.is_free(robot, edge, clearance=CLEARANCE) for edge in edges]
     # OMPL interpolates what was asked about, and its states on free edges are farther from walls than the clearance.
     state = setup.getStateSpace().allocState()
     for number, t in np.ndindex(len(edges), 101):
