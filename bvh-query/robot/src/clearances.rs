@@ -5,9 +5,10 @@
 //! share a table of fixed size, in which the last one of those with one place stays. What is held never affects an answer, only who
 //! is asked: a bound is one whether it was kept or not.
 
+use crate::around::{Around, long};
 use crate::frame::{Frame, Point, each, length};
 use crate::setting::{OFF_RIGID, Part, Setting};
-use bvh_query::Querier;
+use bvh_query::{Querier, Side};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,12 +39,9 @@ struct Still {
     /// The box around its core: its middle, and half of its sides.
     middle: Point,
     half: Point,
-    /// A cylinder around the core, about an axis through the middle: which one, and its radius.
-    round: Option<(usize, f64)>,
+    around: Around,
     /// What the core is rounded with.
     radius: f64,
-    /// Whether the distance from these bounds is nearly that from the part.
-    is_tight: bool,
     /// How much lengths may depend on the frame, as a part of them, where its place is not quite rigid, and the part's size.
     off: f64,
     size: f64,
@@ -101,46 +99,45 @@ impl Clearances {
         if small.bound(point, self.side, held) > distance {
             return true;
         }
-        held.to_bits() & TIGHT_BIT == 0
-            && small.bound(point, self.side, self.shapes(setting, querier, &small)) > distance
+        !held.is_tight() && small.bound(point, self.side, self.shapes(setting, querier, &small)) > distance
     }
 
     /// Returns what is held of a cell or, if it is nothing, the distance from boxes.
     #[inline]
-    fn bound_of(&self, cell: &Cell) -> f32 {
+    fn bound_of(&self, cell: &Cell) -> Held {
         let (place, key) = cell.place();
         let held = self.held(cell, place).load(Ordering::Relaxed);
-        if held >> 32 == key { f32::from_bits(held as u32) } else { self.keep_bounds(cell) }
+        if held >> 32 == key { Held(held as u32) } else { self.keep_bounds(cell) }
     }
 
     #[inline(never)]
-    fn keep_bounds(&self, cell: &Cell) -> f32 {
+    fn keep_bounds(&self, cell: &Cell) -> Held {
         let (bound, is_tight) = self.distance_of_bounds(&cell.middle(self.side));
         self.keep(cell, bound, is_tight)
     }
 
-    /// Returns the distance of the middle of a cell from the shapes, and keeps it.
+    /// Returns the distance of the middle of a cell from the shapes, and keeps it. It is no less than that from boxes, so that what was
+    /// beyond a distance before still is.
     #[inline(never)]
-    fn shapes(&self, setting: &Setting, querier: &mut Querier, cell: &Cell) -> f32 {
+    fn shapes(&self, setting: &Setting, querier: &mut Querier, cell: &Cell) -> Held {
         let point = cell.middle(self.side);
-        let exact = self.still.iter().filter(|still| still.is_tight).map(|still| still.distance_of(&point));
+        let exact =
+            self.still.iter().filter(|still| still.around.is_tight).map(|still| still.distance_of(&point));
         let mut least = exact.fold(f64::INFINITY, f64::min);
-        for still in self.still.iter().filter(|still| !still.is_tight) {
+        for still in self.still.iter().filter(|still| !still.around.is_tight) {
             if still.distance_of(&point) < least {
                 least = least.min(still.distance_of_shape(setting, querier, &point, least));
             }
         }
-        self.keep(cell, (least - self.rounding - ROUNDING * length(point)).max(0.0), true)
+        let (of_bounds, _) = self.distance_of_bounds(&point);
+        self.keep(cell, (least - self.rounding - ROUNDING * length(point)).max(of_bounds), true)
     }
 
-    /// Keeps a bound of a cell. Its last bit says whether it is that of shapes.
-    fn keep(&self, cell: &Cell, bound: f64, is_tight: bool) -> f32 {
-        let rounded = (bound as f32).next_down().max(0.0).to_bits();
-        // At most two steps below the bound.
-        let bits = if is_tight { rounded.saturating_sub(1) | TIGHT_BIT } else { rounded & !TIGHT_BIT };
+    fn keep(&self, cell: &Cell, bound: f64, is_tight: bool) -> Held {
+        let held = Held::below(bound, is_tight);
         let (place, key) = cell.place();
-        self.held(cell, place).store(key << 32 | u64::from(bits), Ordering::Relaxed);
-        f32::from_bits(bits)
+        self.held(cell, place).store(key << 32 | u64::from(held.0), Ordering::Relaxed);
+        held
     }
 
     /// Returns what is held at the place of a cell.
@@ -158,7 +155,7 @@ impl Clearances {
         for still in &self.still {
             let away = still.distance_of(point);
             if away < least {
-                (least, is_tight) = (away, still.is_tight);
+                (least, is_tight) = (away, still.around.is_tight);
             }
         }
         ((least - self.rounding - ROUNDING * length(*point)).max(0.0), is_tight)
@@ -169,16 +166,14 @@ impl Clearances {
         let distance = distance + self.rounding + ROUNDING * length(*point);
         for (place, still) in self.still.iter().enumerate() {
             let away = still.distance_of(point);
-            // NaN is not beyond anything.
-            if away <= distance || away.is_nan() {
+            // Nothing is beyond NaN.
+            if away <= distance || distance.is_nan() {
                 visit(place, away);
             }
         }
     }
 }
 
-/// Bounds are nearly as far away as what they bound if so much of them is full.
-const TIGHT: f64 = 0.9;
 /// Points farther away, in small cells, are not kept.
 const MOST_CELLS: f64 = (1u32 << (ACROSS + HIGH - 1)) as f64;
 /// Bits of a cell's coordinate that are not its place in the table.
@@ -186,8 +181,30 @@ const HIGH: u32 = 9;
 /// More than the rounding of a way.
 const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
 
-/// The last bit of a bound that is held: it comes from shapes, not from the boxes around them alone.
-const TIGHT_BIT: u32 = 1;
+/// What is held of a cell: the bits of a bound in `f32`, of which the last one does not count as such.
+#[derive(Clone, Copy)]
+struct Held(u32);
+
+impl Held {
+    /// The last bit: the bound is that of shapes, or nearly so, not only that of the boxes around them.
+    const TIGHT: u32 = 1;
+
+    /// Rounds a bound down.
+    fn below(bound: f64, is_tight: bool) -> Self {
+        let rounded = (bound as f32).next_down().max(0.0).to_bits();
+        Self(rounded & !Self::TIGHT | u32::from(is_tight))
+    }
+
+    #[inline]
+    fn bound(self) -> f64 {
+        f64::from(f32::from_bits(self.0 & !Self::TIGHT))
+    }
+
+    #[inline]
+    fn is_tight(self) -> bool {
+        self.0 & Self::TIGHT != 0
+    }
+}
 
 /// A cell, by its coordinates.
 struct Cell {
@@ -227,45 +244,19 @@ impl Cell {
 
     /// Returns a lower bound at a point of the cell, given the one that is held.
     #[inline]
-    fn bound(&self, point: &Point, side: f64, held: f32) -> f64 {
+    fn bound(&self, point: &Point, side: f64, held: Held) -> f64 {
         let middle = self.middle(side);
-        f64::from(held) - length(each(|k| point[k] - middle[k])) * ROUNDED_UP
+        held.bound() - length(each(|k| point[k] - middle[k])) * ROUNDED_UP
     }
 }
 
 impl Still {
     fn new(number: usize, part: &Part) -> Self {
-        let shape = part.shape.shape();
-        let radius = shape.radius();
-        let (middle, half) = (part.middle_of_box, part.half.map(|half| (half - radius).max(0.0)));
-        let mut around = [0.0f64; 3];
-        let mut volume = 0.0;
-        let visited = shape.visit_triangles(|_, corners| {
-            let [a, b, c] = corners.map(|corner| each(|k| corner[k] - middle[k]));
-            volume += a[0] * (b[1] * c[2] - b[2] * c[1])
-                + a[1] * (b[2] * c[0] - b[0] * c[2])
-                + a[2] * (b[0] * c[1] - b[1] * c[0]);
-            for corner in [a, b, c] {
-                for k in 0..3 {
-                    around[k] = around[k].max(long(corner[(k + 1) % 3], corner[(k + 2) % 3]));
-                }
-            }
-        });
-        if visited.is_err() {
-            around = [f64::INFINITY; 3];
-        }
-        let volume = f64::abs(volume) / 6.0;
-        let of_box = 8.0 * half.iter().product::<f64>();
-        let of_round = |k: usize| 2.0 * half[k] * std::f64::consts::PI * around[k] * around[k];
-        let axis = [0, 1, 2].into_iter().min_by(|a, b| of_round(*a).total_cmp(&of_round(*b))).unwrap_or(0);
-        let round = (of_round(axis) < of_box).then_some((axis, around[axis] * ROUNDED_UP));
-        let of_bounds = if round.is_some() { of_round(axis) } else { of_box };
-        // A point, and a segment along an axis.
-        let is_thin = half.iter().filter(|half| **half > 0.0).count() < 2;
-        let is_tight = is_thin || shape.is_solid() && volume > TIGHT * of_bounds;
+        let radius = part.shape.shape().radius();
+        let (middle, half) = (part.middle_of_box, part.half_of_core());
         let off = OFF_RIGID * part.departure;
         let size = length(middle) + length(half) + radius;
-        Self { part: number, frame: part.origin, middle, half, round, radius, is_tight, off, size }
+        Self { part: number, frame: part.origin, middle, half, around: *part.around(), radius, off, size }
     }
 
     /// Returns how far a point is from the bounds.
@@ -273,7 +264,7 @@ impl Still {
     fn distance_of(&self, point: &Point) -> f64 {
         let found = self.frame.find(*point);
         let at = each(|k| (found[k] - self.middle[k]).abs());
-        let beyond = match self.round {
+        let beyond = match self.around.cylinder {
             None => length(each(|k| (at[k] - self.half[k]).max(0.0))),
             Some((axis, radius)) => {
                 let away = long(at[(axis + 1) % 3], at[(axis + 2) % 3]);
@@ -298,24 +289,16 @@ impl Still {
     fn distance_of_shape(&self, setting: &Setting, querier: &mut Querier, point: &Point, within: f64) -> f64 {
         let shape = &setting.parts[self.part].shape;
         let at = self.frame.find(*point);
-        let lower = match querier.closest_point(shape, at, within) {
-            Ok(Some(closest)) => (closest.lower - self.off_rigid(&at)).max(0.0),
-            Ok(None) => return (within - self.off_rigid(&at)).max(0.0),
-            Err(_) => return 0.0,
-        };
-        let is_outside = |querier: &mut Querier| {
-            querier.side(shape, at).is_ok_and(|side| side == bvh_query::Side::Outside)
-        };
-        if shape.shape().is_solid() && self.distance_of(point) == 0.0 && !is_outside(querier) {
-            0.0
-        } else {
-            lower
+        // Deep inside a solid, no surface need be near.
+        let may_be_inside = shape.shape().is_solid() && self.distance_of(point) == 0.0;
+        if may_be_inside && !querier.side(shape, at).is_ok_and(|side| side == Side::Outside) {
+            return 0.0;
+        }
+        match querier.closest_point(shape, at, within) {
+            Ok(closest) => closest.map_or(within, |closest| closest.lower) - self.off_rigid(&at),
+            Err(_) => 0.0,
         }
     }
-}
-
-fn long(x: f64, y: f64) -> f64 {
-    (x * x + y * y).sqrt()
 }
 
 #[cfg(test)]
@@ -326,7 +309,7 @@ mod tests {
     use crate::testing::{robot, tree};
     use bvh_bake::mesh::Mesh;
     use bvh_bake::{Options, shapes, to_bytes};
-    use bvh_query::{Bvh, OwnedShape, Pose, Side};
+    use bvh_query::{Bvh, OwnedShape, Pose};
     use cbvh_testkit::Random;
 
     fn shape(mesh: &Mesh) -> OwnedShape {
@@ -339,7 +322,7 @@ mod tests {
         for number in 0..1 + random.below(8) {
             let sides = [(); 3].map(|()| scale * (0.02 + 0.5 * random.unit()));
             let (positions, triangles) = cbvh_testkit::ball::ball(200);
-            let shape = match random.below(6) {
+            let shape = match random.below(7) {
                 0 => shape(&shapes::block(sides).unwrap()).solid().unwrap(),
                 1 => shape(&shapes::cylinder(sides[0], sides[1], sides[0] * 1e-2).unwrap().mesh)
                     .solid()
@@ -347,16 +330,87 @@ mod tests {
                 2 => shape(&shapes::segment([0.0; 3], sides)).rounded(sides[0]).unwrap(),
                 3 => shape(&shapes::point(sides)).rounded(sides[1]).unwrap(),
                 4 => shape(&shapes::block(sides).unwrap()),
-                _ => shape(&Mesh::from_triangles(
-                    positions.iter().map(|p| [0, 1, 2].map(|k| sides[k] * p[k])).collect(),
-                    triangles,
-                )),
+                kind => {
+                    let positions = positions.iter().map(|p| [0, 1, 2].map(|k| sides[k] * p[k])).collect();
+                    let ball = shape(&Mesh::from_triangles(positions, triangles));
+                    if kind == 5 { ball } else { ball.solid().unwrap() }
+                }
             };
             let pose = Pose::from_quaternion(random.quaternion(), random.point().map(|x| scale * x)).unwrap();
             robot.add_obstacle(format!("obstacle{number}"), shape, &pose).unwrap();
         }
         robot.refresh();
         robot
+    }
+
+    /// Returns a robot whose base is a small ball, among obstacles, and the clearances of these.
+    fn among(obstacles: &[(OwnedShape, Point)]) -> (Robot, Clearances) {
+        let text = "<robot name=\"one\"><link name=\"base\"><collision><geometry><sphere radius=\"0.01\"/></geometry>\
+                    </collision></link></robot>";
+        let mut robot = robot(text, Base::Fixed);
+        for (number, (shape, at)) in obstacles.iter().enumerate() {
+            let pose = Pose::new(*Pose::IDENTITY.rotation(), *at).unwrap();
+            robot.add_obstacle(format!("obstacle{number}"), shape.clone(), &pose).unwrap();
+        }
+        robot.refresh();
+        let parts = &robot.setting.parts;
+        let still: Vec<usize> = (0..parts.len()).filter(|part| parts[*part].is_still).collect();
+        let clearances = Clearances::new(&robot.setting, &still, 0.01);
+        (robot, clearances)
+    }
+
+    /// A point deep inside a solid is not beyond anything, however near something else is.
+    #[test]
+    fn what_is_inside_a_solid_is_not_beyond_it() {
+        let (positions, triangles) = cbvh_testkit::ball::ball(300);
+        let ball = shape(&Mesh::from_triangles(positions, triangles)).solid().unwrap();
+        let small = shape(&shapes::block([0.2; 3]).unwrap()).solid().unwrap();
+        let (robot, clearances) = among(&[(ball, [0.0; 3]), (small, [0.5, 0.0, 0.0])]);
+        let mut querier = Querier::new().unwrap();
+        assert!(!clearances.is_beyond(&robot.setting, &mut querier, &[0.01, 0.0, 0.0], 0.1));
+    }
+
+    /// What has been asked before does not affect what is said of a point: bounds from shapes are no lower than those from boxes.
+    #[test]
+    fn what_is_held_does_not_matter() {
+        // The surface is as far away as the box around it.
+        let wall = [(shape(&shapes::block([1.0; 3]).unwrap()), [0.0; 3])];
+        let (robot, fresh) = among(&wall);
+        let mut querier = Querier::new().unwrap();
+        for place in 0..200 {
+            let (_, asked) = among(&wall);
+            let cell = Cell { at: [60 + place, 0, 0], is_large: false };
+            let middle = cell.middle(fresh.side);
+            let distance = (fresh.bound_of(&cell).bound() - fresh.rounding).next_down();
+            assert!(!asked.is_beyond(&robot.setting, &mut querier, &middle, 100.0));
+            let answers =
+                [&fresh, &asked].map(|of| of.is_beyond(&robot.setting, &mut querier, &middle, distance));
+            assert_eq!(answers, [true; 2], "{place}");
+        }
+    }
+
+    #[test]
+    fn no_bound_is_rounded_up() {
+        let (_, clearances) = among(&[(shape(&shapes::block([1.0; 3]).unwrap()), [0.0; 3])]);
+        let cell = Cell { at: [0; 3], is_large: false };
+        for bound in [0.0, 1e-50, 1e-45, 1e-39, 1e-9, 0.1, 1.0, 1.0 + 1e-9, 1e30, 1e300] {
+            for is_tight in [false, true] {
+                clearances.keep(&cell, bound, is_tight);
+                let held = clearances.bound_of(&cell);
+                assert!(held.bound() <= bound && held.is_tight() == is_tight, "{bound}: {}", held.bound());
+                assert!(!(1e-30..=1e38).contains(&bound) || held.bound() > bound * (1.0 - 1e-6), "{bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_is_near_where_nothing_is_known() {
+        let (_, clearances) = among(&[(shape(&shapes::block([1.0; 3]).unwrap()), [0.0; 3])]);
+        for (point, distance) in [([9.0; 3], f64::NAN), ([f64::NAN; 3], 0.0), ([9.0; 3], f64::INFINITY)] {
+            let mut seen = 0;
+            clearances.near(&point, distance, |_, _| seen += 1);
+            assert_eq!(seen, 1, "{point:?} {distance}");
+        }
     }
 
     /// What is beyond a distance really is, and what is well beyond is found to be.

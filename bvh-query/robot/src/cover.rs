@@ -22,15 +22,20 @@ pub(crate) struct Ball {
 const MOST: usize = 63;
 /// Balls that are this part of the one around everything are not divided.
 const FINEST: f64 = 1.0 / 16.0;
-/// More than the error of a corner, which has been cut by a few planes, as a part of the coordinates' size.
+/// More than the error of a corner, which has been cut by at most `MOST` planes, as a part of the coordinates' size.
 const ROUNDING: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// Returns the balls around a part, the one around all of it first.
 ///
-/// Cost: reading the shape once, and some cuts of each triangle.
+/// Cost: reading the shape once, and some cuts of each triangle, all of which are in memory meanwhile.
 pub(crate) fn cover(shape: &OwnedShape, querier: &mut Querier) -> Result<Vec<Ball>, QueryError> {
     let mut surface: Vec<Polygon> = Vec::new();
-    shape.shape().visit_triangles(|_, corners| surface.push(corners.to_vec()))?;
+    shape.shape().visit_triangles(|_, corners| {
+        // Duplicates follow each other. A damaged file may state any number of them.
+        if surface.last().is_none_or(|last| *last != corners) {
+            surface.push(corners.to_vec());
+        }
+    })?;
     let points = || surface.iter().flatten();
     let mut cell = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for point in points() {

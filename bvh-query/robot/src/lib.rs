@@ -7,13 +7,14 @@
 //!                                                  ├──> questions about configurations (questions, asker, rod)
 //!                                                  ├──> pairs that are near, with derivatives (near_pairs)
 //!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns),
-//!                                                  │      most of them by balls (screening, screen, cover, states, clearances)
+//!                                                  │      most of them by balls (screening, screen, cover, states, clearances, around)
 //!                                                  ├──> plain data, and back (parts)
 //!                                                  └──> what programs draw (tree)
 //! ```
 //!
 //! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
 
+mod around;
 mod asker;
 mod capsules;
 mod clearances;

@@ -68,8 +68,9 @@ impl Robot {
     /// and turns of more than 16,384 radians are refused.
     ///
     /// How far obstacles are away is kept, for all clones and threads, until one of them moves, comes or goes: in cells of space, which are
-    /// filled where motions pass. That takes some MiB, at most 128 MiB. The first motion after a change takes longer; the first of
-    /// all also computes the balls, and reads the shapes of all links for that. Nothing of it affects an answer.
+    /// filled where motions pass. That takes some MiB, at most 129 MiB for each world that a robot or a clone still is in. The first
+    /// motion after a change takes longer. The first one with a shape also reads it: for the balls of a link or an attached object,
+    /// whose triangles are in memory meanwhile, or for bounds of an obstacle. Nothing of it affects an answer.
     ///
     /// # Errors
     /// The errors of [`Robot::collide`].
@@ -194,7 +195,7 @@ impl Asker {
             let screen = screens.of(setting, &mut asker.querier)?;
             let steps = screening.start(screen.0, setting, edge, &bounds);
             let is_tested = options.clearance == 0.0;
-            let test = &mut Touches { asker, setting, edge, steps, is_tested, placed: None };
+            let test = &mut Touches { asker, setting, edge, bounds: &bounds, steps, is_tested, placed: None };
             if Search::new(screen, setting, screening, test).motion(options)? {
                 return Ok(false);
             }
@@ -225,9 +226,9 @@ impl Asker {
         answer
     }
 
-    /// Returns whether B stays farther from A than the clearance, until a time, given the steps in which it may come near. An interval is free if what separates both in its middle is more
-    /// than B moves on the way there: seen from the balls around both, or else from the shapes. Others are halved, until the bound
-    /// of the sagitta decides, which is the better one for short intervals.
+    /// Returns whether B stays farther from A than the clearance, until a time, given the steps in which it may come near. An interval
+    /// is free if what separates both in its middle is more than B moves on the way there: seen from the balls around both, or else
+    /// from the shapes. Others are halved, until the bound of the sagitta decides, which is the better one for short intervals.
     fn is_pair_free(
         &mut self,
         path: &PairPath<'_>,
@@ -320,7 +321,8 @@ impl Asker {
         self.with_screening(|asker, screening| {
             let screen = screens.of(setting, &mut asker.querier)?;
             let steps = screening.start(screen.0, setting, edge, &bounds);
-            let test = &mut Touches { asker, setting, edge, steps, is_tested: false, placed: None };
+            let is_tested = false;
+            let test = &mut Touches { asker, setting, edge, bounds: &bounds, steps, is_tested, placed: None };
             Search::new(screen, setting, screening, test).motion(options)?;
             let found = &mut screening.found;
             found.sort_unstable();
@@ -397,6 +399,7 @@ struct Touches<'a> {
     asker: &'a mut Asker,
     setting: &'a Setting,
     edge: &'a Edge,
+    bounds: &'a [[Bounds; 2]],
     steps: usize,
     /// Whether any pair is tested.
     is_tested: bool,
@@ -413,12 +416,24 @@ impl Test for Touches<'_> {
         if !self.is_tested {
             return Ok(false);
         }
+        let Self { setting, edge, .. } = *self;
+        let time = (step as f64 + 0.5) / self.steps as f64;
         if self.placed != Some(step) {
-            let time = (step as f64 + 0.5) / self.steps as f64;
-            self.asker.place(self.setting, &at(&self.setting.model, self.edge, time))?;
+            self.asker.place(setting, &at(&setting.model, edge, time))?;
             self.placed = Some(step);
         }
-        self.asker.touches(self.setting, pair)
+        if !self.asker.touches(setting, pair)? {
+            return Ok(false);
+        }
+        let of = &setting.pairs[pair];
+        // What rods say is certain. What touches by a rounding may not do so in the frame of the exact questions.
+        if self.asker.rods_are_within(setting, of, 0.0) == Some(true) {
+            return Ok(true);
+        }
+        let joints = JointPaths::new(&setting.model, edge, self.bounds);
+        let path = PairPath::new(setting, of, &joints)?;
+        let touches = self.asker.querier.collide(&path.a.shape, &path.b.shape, &path.pose(time));
+        touches.map_err(|source| failed(setting, of, source))
     }
 }
 

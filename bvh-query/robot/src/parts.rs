@@ -111,6 +111,7 @@ impl Robot {
         }
         let pairs = allowed.iter().map(|[a, b]| robot.bodies(a, b));
         robot.allowed = Arc::new(pairs.collect::<Result<_, _>>()?);
+        robot.is_stale = true;
         robot.refresh();
         Ok(robot)
     }

@@ -58,7 +58,7 @@ pub struct Robot {
     /// Pairs of bodies whose contact is allowed, in order.
     pub(crate) allowed: Arc<HashSet<[usize; 2]>>,
     /// The setting lacks pairs after a change.
-    is_stale: bool,
+    pub(crate) is_stale: bool,
 }
 
 impl Clone for Robot {

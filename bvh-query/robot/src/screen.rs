@@ -75,6 +75,8 @@ pub(crate) struct Screened {
     pub(crate) pairs: Vec<usize>,
     /// The largest default tolerance of a pair with it.
     pub(crate) tolerance: f64,
+    /// See [`Part::departure`].
+    pub(crate) departure: f64,
 }
 
 /// The most fields of clearances. Links that differ in what they may touch have fields of their own.
@@ -91,7 +93,8 @@ impl Screen {
         screen.finest = if finest > 0.0 { finest } else { 1.0 };
         for part in &setting.parts {
             let root = screen.balls.len();
-            screen.parts.push(Screened { group: part.group, root, ..Screened::default() });
+            let &Part { group, departure, .. } = part;
+            screen.parts.push(Screened { group, root, departure, ..Screened::default() });
             if !part.is_still {
                 let cover = part.cover(querier)?;
                 screen.take(part, cover, finest);

@@ -64,6 +64,8 @@ const ROUNDED_DOWN: f64 = 1.0 - 1.0 / (1u64 << 46) as f64;
 const MOST_REACH: f64 = (1u128 << 100) as f64;
 /// So do motions of larger angles, in radians.
 const MOST_ANGLE: f64 = (1u64 << 30) as f64;
+/// Far more than what is lost where exact questions count coordinates below 2^-213 as 0, and than what squares lose here.
+const FLUSHED: f64 = 1.0 / (1u128 << 100) as f64 / (1u128 << 100) as f64;
 /// How often a step's chord is cut where it is all that is left to cut.
 const CUTS: usize = 4;
 
@@ -146,7 +148,7 @@ pub(crate) struct Search<'a> {
     of: &'a mut Screening,
     test: &'a mut dyn Test,
     steps: usize,
-    /// What is added to a ball for what must stay clear.
+    /// What is added to balls for what must stay clear.
     limit: f64,
 }
 
@@ -174,6 +176,7 @@ impl<'a> Search<'a> {
     /// likely to touch is a hit. Returns whether one is.
     pub(crate) fn motion(&mut self, options: &MotionOptions) -> Result<bool, RobotError> {
         let (screen, fields) = (self.screen, self.fields);
+        let MotionOptions { clearance, tolerance, .. } = *options;
         self.of.likely.clear();
         let all = mask(0, self.steps);
         if self.of.is_far || fields.iter().any(|field| is_more(field.farthest, MOST_REACH)) {
@@ -189,7 +192,7 @@ impl<'a> Search<'a> {
                 continue;
             };
             let field = &fields[field];
-            self.limit_of(of, options);
+            self.limit = self.limit_of(&[of], clearance + tolerance.unwrap_or(of.tolerance));
             let mut steps = 0;
             if self.field(of, field, of.root, [0, self.steps], &mut Near::Some(&mut steps))? {
                 return Ok(true);
@@ -198,14 +201,12 @@ impl<'a> Search<'a> {
                 near.push((of, field, steps));
             }
         }
-        let MotionOptions { clearance, tolerance, .. } = *options;
         self.find_middles();
         for &number in &screen.mutual {
             let pair = &self.setting.pairs[number];
             let [a, b] = [pair.a, pair.b].map(|part| &screen.parts[part]);
-            let rounding = self.of.moves[a.group].rounding + self.of.moves[b.group].rounding;
             let tolerance = tolerance.unwrap_or(a.tolerance.min(b.tolerance));
-            self.limit = (clearance + tolerance + rounding) * ROUNDED_UP;
+            self.limit = self.limit_of(&[a, b], clearance + tolerance);
             let [from, to] = [pair.a, pair.b].map(|part| self.of.middles[part]);
             if apart(&from.0, &to.0) > (from.1 + to.1 + self.limit) * ROUNDED_UP {
                 continue;
@@ -237,17 +238,19 @@ impl<'a> Search<'a> {
         self.of.likely = likely;
         // Now what it comes near.
         for (of, field, steps) in near {
-            self.limit_of(of, options);
+            self.limit = self.limit_of(&[of], clearance + tolerance.unwrap_or(of.tolerance));
             let first = self.of.found.len();
             self.field(of, field, of.root, [0, self.steps], &mut Near::All { steps, first })?;
         }
         Ok(false)
     }
 
-    /// Sets the limit for a part against what stands still.
-    fn limit_of(&mut self, of: &Screened, options: &MotionOptions) {
-        let rounding = self.of.moves[of.group].rounding;
-        self.limit = (options.clearance + options.tolerance.unwrap_or(of.tolerance) + rounding) * ROUNDED_UP;
+    /// Returns what is added to the balls of parts that move, for a distance that must stay clear. Where the place of a part is not
+    /// quite rigid, that distance depends on the frame as well.
+    fn limit_of(&self, parts: &[&Screened], distance: f64) -> f64 {
+        let rounding: f64 = parts.iter().map(|part| self.of.moves[part.group].rounding).sum();
+        let departure: f64 = parts.iter().map(|part| part.departure).sum();
+        (distance + rounding) * (ROUNDED_UP + departure) + FLUSHED
     }
 
     /// Finds where the middles of the balls around all parts are in the middle of the motion, and how far they get from there at most.
@@ -485,7 +488,9 @@ mod tests {
     use crate::edge::bounds;
     use crate::options::Base;
     use crate::pair_path::{JointPaths, PairPath};
-    use crate::testing::{robot, tree, values};
+    use crate::robot::Robot;
+    use crate::testing::{robot, scaled_tree, tree, values};
+    use bvh_bake::mesh::Mesh;
     use bvh_bake::{Options, shapes, to_bytes};
     use bvh_query::{Bvh, OwnedShape, Pose, RigidPath};
     use cbvh_testkit::Random;
@@ -503,11 +508,194 @@ mod tests {
         }
     }
 
+    /// Screens a motion, and asserts that what is left out is farther apart than the limit, at many moments. Returns the number of
+    /// steps of pairs that are left out and of those that are not, and how near to the limit those left out come, as a part of
+    /// their sizes.
+    fn check(robot: &mut Robot, edge: &Edge, options: &MotionOptions, what: &str) -> (u32, u32, f64) {
+        robot.refresh();
+        let (mut querier, setting) = (Querier::new().unwrap(), &*robot.setting);
+        let (mut left_out, mut kept, mut closest) = (0, 0, f64::INFINITY);
+        let bounds = bounds(&setting.model, edge);
+        let screen = robot.screens.of(setting, &mut querier).unwrap();
+        let mut screening = Screening::default();
+        let steps = screening.start(screen.0, setting, edge, &bounds);
+        let asked = &mut Nothing(Querier::new().unwrap());
+        Search::new(screen, setting, &mut screening, asked).motion(options).unwrap();
+        let joints = JointPaths::new(&setting.model, edge, &bounds);
+        for (number, pair) in setting.pairs.iter().enumerate() {
+            let near = screening.found.iter().find(|found| found.0 == number).map_or(0, |found| found.1);
+            let path = PairPath::new(setting, pair, &joints).unwrap();
+            let limit = options.clearance + options.tolerance_between(&path.a.shape, &path.b.shape);
+            for step in 0..steps {
+                if near >> step & 1 == 1 {
+                    kept += 1;
+                    continue;
+                }
+                left_out += 1;
+                for share in [0.0, 0.3, 0.5, 0.8, 1.0] {
+                    let pose = path.pose((step as f64 + share) / steps as f64);
+                    let apart = querier.distance(&path.a.shape, &path.b.shape, &pose).unwrap().lower;
+                    assert!(apart > limit, "{what}, pair {number}, step {step}: {apart} {limit}");
+                    closest = closest.min((apart - limit) / path.reach);
+                }
+            }
+        }
+        (left_out, kept, closest)
+    }
+
+    fn ball(radius: f64) -> OwnedShape {
+        let (bytes, _) = to_bytes(&shapes::point([0.0; 3]), &Options::default()).unwrap();
+        OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).rounded(radius).unwrap()
+    }
+
+    /// A robot without shapes, whose only joint slides along y from a place on x.
+    fn slider(at: f64) -> Robot {
+        let text = "<robot name=\"slider\"><link name=\"base\"/><link name=\"hand\"/><joint name=\"slide\" type=\"prismatic\">\
+                    <parent link=\"base\"/><child link=\"hand\"/><origin xyz=\"AT 0 0\"/><axis xyz=\"0 1 0\"/>\
+                    <limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+        robot(&text.replace("AT", &at.to_string()), Base::Fixed)
+    }
+
+    /// In the frame of something whose place is not quite rigid, a clearance that is much larger than it has another length as well.
+    #[test]
+    fn large_clearances_are_kept_from_what_is_not_placed_rigidly() {
+        let smaller = Pose::IDENTITY.rotation().map(|row| row.map(|x| x * (1.0 - 2f64.powi(-22))));
+        let mut kept = 0;
+        for step in 0..40 {
+            let mut robot = slider(10.0);
+            robot.attach("tool", ball(1e-3), "hand", &Pose::new(smaller, [0.0; 3]).unwrap(), &[]).unwrap();
+            let gap = 1.0 + 1e-8 * f64::from(step);
+            let at = [10.0 + gap + 1.5e-3, 0.0, 0.0];
+            robot
+                .add_obstacle("ball", ball(5e-4), &Pose::new(*Pose::IDENTITY.rotation(), at).unwrap())
+                .unwrap();
+            let options = MotionOptions::new().clearance(1.0);
+            let edge = Edge::straight(&[0.0], &[0.0]).unwrap();
+            kept += check(&mut robot, &edge, &options, &format!("gap {gap}")).1;
+        }
+        assert!(kept > 10);
+    }
+
+    /// Parts and obstacles of all kinds, in all units, far out and in meshes that are, placed as programs do that compute in `f32`, and on
+    /// motions of many kinds.
+    #[test]
+    fn what_is_left_out_stays_apart_in_all_worlds() {
+        let random = &mut Random::new(54);
+        let (mut left_out, mut kept) = (0, 0);
+        for round in 0..120 {
+            let scale = [1.0, 1e-9, 1e9, 1e-3][round % 4];
+            let base = [Base::Fixed, Base::Planar, Base::Floating][round % 3];
+            let mut robot = robot(&scaled_tree(random, 2 + round % 6, scale), base);
+            for number in 0..random.below(5) {
+                // In a frame whose origin is far from the mesh.
+                let off = random.point().map(|x| [0.0, 0.0, 1e4][number % 3] * scale * x);
+                let shape = any_shape(random, scale, off);
+                let turned = match random.below(2) {
+                    0 => random.quaternion(),
+                    _ => random.quaternion().map(|x| f64::from(x as f32)),
+                };
+                let turned = Pose::from_quaternion(turned, [0.0; 3]).unwrap_or(Pose::IDENTITY);
+                let [at, back] = [random.point().map(|x| 0.7 * scale * x), turned.place(off)];
+                let pose = Pose::new(*turned.rotation(), [0, 1, 2].map(|k| at[k] - back[k])).unwrap();
+                let link = robot.links().nth(random.below(robot.links().count())).unwrap().to_owned();
+                match random.below(3) {
+                    0 => robot.attach(format!("tool{number}"), shape, &link, &pose, &[]).unwrap(),
+                    _ => robot.add_obstacle(format!("obstacle{number}"), shape, &pose).unwrap(),
+                }
+            }
+            if round % 5 == 0 {
+                robot.set_margin("link0", 0.05 * scale).unwrap();
+            }
+            robot.refresh();
+            let far = [0.1, 1.0, 3.0][random.below(3)];
+            let mut ends = [(); 2].map(|()| values(random, &robot, far));
+            let is_long: Vec<bool> = (0..ends[0].len()).map(|number| is_length(&robot, number)).collect();
+            let away = [0.0, 0.0, 1e3][random.below(3)];
+            for end in &mut ends {
+                for (value, _) in end.iter_mut().zip(&is_long).filter(|(_, is_long)| **is_long) {
+                    *value = scale * (*value + away);
+                }
+            }
+            let mut edge = Edge::straight(&ends[0], &ends[1]).unwrap();
+            let is_turning = robot.joints().iter().any(|name| name.ends_with("/qx"));
+            if round % 2 == 1 && !is_turning {
+                let degree = [1, 3, 40][random.below(3)];
+                for (of, is_long) in edge.coefficients.iter_mut().zip(&is_long) {
+                    let unit = if *is_long { scale } else { 1.0 };
+                    of.extend((0..degree).map(|_| unit * random.signed() / f64::from(degree)));
+                }
+            }
+            let options = MotionOptions::new()
+                .clearance([0.0, 0.0, 0.1][random.below(3)] * scale)
+                .tolerance([None, Some(1e-4 * scale)][random.below(2)]);
+            let found = check(&mut robot, &edge, &options, &format!("round {round}"));
+            (left_out, kept) = (left_out + found.0, kept + found.1);
+        }
+        assert!(left_out > 10_000 && kept > 1000, "{left_out} {kept}");
+    }
+
+    /// Returns whether a joint value is a length.
+    fn is_length(robot: &Robot, number: usize) -> bool {
+        let model = &robot.setting.model;
+        model.joints.iter().any(|joint| match joint.kind {
+            Kind::Turn { .. } => false,
+            Kind::Slide { by, .. } => by.number == number,
+            Kind::Planar(first) => (first..first + 2).contains(&number),
+            Kind::Floating(first) => (first..first + 3).contains(&number),
+        })
+    }
+
+    /// Returns a shape of some kind, somewhere in its frame.
+    fn any_shape(random: &mut Random, scale: f64, at: Point) -> OwnedShape {
+        let sides = [(); 3].map(|()| scale * (0.02 + 0.4 * random.unit()));
+        let (positions, triangles) = cbvh_testkit::ball::ball(200);
+        let baked = |mut mesh: Mesh| -> OwnedShape {
+            for object in &mut mesh.objects {
+                object.positions.iter_mut().for_each(|p| *p = each(|k| p[k] + at[k]));
+            }
+            Bvh::from_bytes(to_bytes(&mesh, &Options::default()).unwrap().0).unwrap().into()
+        };
+        let cylinder = || shapes::cylinder(sides[0], sides[1], sides[0] * 1e-2).unwrap().mesh;
+        let ball = || {
+            Mesh::from_triangles(
+                positions.iter().map(|p| each(|k| sides[k] * p[k])).collect(),
+                triangles.clone(),
+            )
+        };
+        match random.below(9) {
+            0 => baked(shapes::block(sides).unwrap()).solid().unwrap(),
+            1 => baked(shapes::block(sides.map(|x| 3.0 * x)).unwrap()),
+            2 => baked(cylinder()).solid().unwrap(),
+            3 => baked(ball()).solid().unwrap(),
+            4 => baked(ball()),
+            5 => baked(shapes::segment([0.0; 3], sides)).rounded(0.5 * sides[0]).unwrap(),
+            6 => baked(shapes::block(sides).unwrap()).rounded(0.3 * sides[1]).unwrap(),
+            7 => {
+                let cloud: Vec<_> = (0..30).map(|_| random.point().map(|x| 0.5 * scale * x)).collect();
+                baked(shapes::cloud(&cloud)).rounded(0.1 * sides[0]).unwrap()
+            }
+            _ => baked(Mesh::from_triangles(
+                (0..12).map(|_| random.point().map(|x| 0.3 * scale * x)).collect(),
+                (0..4).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
+            )),
+        }
+    }
+
+    /// What is so small that exact questions count coordinates as 0 touches.
+    #[test]
+    fn what_counts_as_nothing_is_kept() {
+        let mut robot = slider(0.0);
+        let pose = |at: Point| Pose::new(*Pose::IDENTITY.rotation(), at).unwrap();
+        robot.attach("tool", ball(1e-72), "hand", &pose([0.0; 3]), &[]).unwrap();
+        robot.attach("other", ball(1e-72), "base", &pose([0.0; 3]), &[]).unwrap();
+        let edge = Edge::straight(&[1e-70], &[2e-70]).unwrap();
+        check(&mut robot, &edge, &MotionOptions::new().tolerance(1e-75), "tiny");
+    }
+
     /// What the screen leaves out is farther apart than the limit, at all of many moments.
     #[test]
     fn what_is_left_out_stays_apart() {
         let random = &mut Random::new(53);
-        let mut querier = Querier::new().unwrap();
         let (mut left_out, mut kept, mut closest) = (0, 0, f64::INFINITY);
         for round in 0..60 {
             let base = [Base::Fixed, Base::Planar, Base::Floating][round % 3];
@@ -537,32 +725,8 @@ mod tests {
             }
             let mut options = MotionOptions::default();
             options.clearance = [0.0, 0.0, 0.05][random.below(3)];
-            let setting = &*robot.setting;
-            let bounds = bounds(&setting.model, &edge);
-            let screen = robot.screens.of(setting, &mut querier).unwrap();
-            let mut screening = Screening::default();
-            let steps = screening.start(screen.0, setting, &edge, &bounds);
-            let asked = &mut Nothing(Querier::new().unwrap());
-            Search::new(screen, setting, &mut screening, asked).motion(&options).unwrap();
-            let joints = JointPaths::new(&setting.model, &edge, &bounds);
-            for (number, pair) in setting.pairs.iter().enumerate() {
-                let near = screening.found.iter().find(|found| found.0 == number).map_or(0, |found| found.1);
-                let path = PairPath::new(setting, pair, &joints).unwrap();
-                let limit = options.clearance + options.tolerance_between(&path.a.shape, &path.b.shape);
-                for step in 0..steps {
-                    if near >> step & 1 == 1 {
-                        kept += 1;
-                        continue;
-                    }
-                    left_out += 1;
-                    for share in [0.0, 0.3, 0.5, 0.8, 1.0] {
-                        let pose = path.pose((step as f64 + share) / steps as f64);
-                        let apart = querier.distance(&path.a.shape, &path.b.shape, &pose).unwrap().lower;
-                        assert!(apart > limit, "round {round}, pair {number}, step {step}: {apart} {limit}");
-                        closest = closest.min((apart - limit) / path.reach);
-                    }
-                }
-            }
+            let found = check(&mut robot, &edge, &options, &format!("round {round}"));
+            (left_out, kept, closest) = (left_out + found.0, kept + found.1, closest.min(found.2));
         }
         assert!(left_out > 20_000 && kept > 200, "{left_out} {kept}");
         assert!(closest < 0.1, "{closest}");

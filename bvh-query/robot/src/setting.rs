@@ -1,5 +1,6 @@
 //! What questions are about: bodies, their shapes where they are, and the pairs that are asked about.
 
+use crate::around::Around;
 use crate::cover::{Ball, cover};
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, departure, length};
@@ -49,6 +50,8 @@ pub(crate) struct Part {
     pub(crate) rods: Option<Rods>,
     /// Balls that together contain it, in its own frame: computed when they are first needed.
     cover: Arc<OnceLock<Vec<Ball>>>,
+    /// The same of what bounds it as an obstacle. Both remain when it moves.
+    around: Arc<OnceLock<Around>>,
 }
 
 impl Part {
@@ -80,6 +83,7 @@ impl Part {
             departure: departure_of(&origin),
             rods,
             cover: Arc::default(),
+            around: Arc::default(),
         })
     }
 
@@ -90,6 +94,16 @@ impl Part {
         }
         let cover = cover(&self.shape, querier)?;
         Ok(self.cover.get_or_init(|| cover))
+    }
+
+    /// Returns what bounds the part as an obstacle.
+    pub(crate) fn around(&self) -> &Around {
+        self.around.get_or_init(|| Around::new(self.shape.shape(), &self.middle_of_box, &self.half_of_core()))
+    }
+
+    /// Returns half of the sides of the box around its core.
+    pub(crate) fn half_of_core(&self) -> Point {
+        self.half.map(|half| (half - self.shape.shape().radius()).max(0.0))
     }
 
     /// Moves it to another place in its group.
@@ -167,7 +181,6 @@ pub(crate) struct Setting {
 }
 
 impl Setting {
-    /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch.
     /// Lists the pairs that are asked about: those that can move against each other, but for pairs of bodies that may touch. Pairs of
     /// the same bodies follow each other.
     pub(crate) fn list_pairs(&mut self, allowed: &HashSet<[usize; 2]>) {

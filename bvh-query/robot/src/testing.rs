@@ -7,6 +7,11 @@ use std::fmt::Write;
 
 /// Writes a tree of links, each a ball, with joints of all kinds.
 pub(crate) fn tree(random: &mut Random, links: usize) -> String {
+    scaled_tree(random, links, 1.0)
+}
+
+/// Writes such a tree in another unit.
+pub(crate) fn scaled_tree(random: &mut Random, links: usize, scale: f64) -> String {
     let mut text = String::from("<robot name=\"tree\">\n");
     let mut single = Vec::new();
     let point = |random: &mut Random, far: f64| {
@@ -14,7 +19,7 @@ pub(crate) fn tree(random: &mut Random, links: usize) -> String {
         format!("{x} {y} {z}")
     };
     for link in 0..links {
-        let (at, radius) = (point(random, 0.2), 0.02 + 0.05 * random.unit());
+        let (at, radius) = (point(random, 0.2 * scale), scale * (0.02 + 0.05 * random.unit()));
         let origin = format!("<origin xyz=\"{at}\" rpy=\"{}\"/>", point(random, 3.0));
         let shape = format!("<geometry><sphere radius=\"{radius}\"/></geometry>");
         writeln!(text, "<link name=\"link{link}\"><collision>{origin}{shape}</collision></link>").unwrap();
@@ -25,7 +30,7 @@ pub(crate) fn tree(random: &mut Random, links: usize) -> String {
         let kind = kinds[random.below(kinds.len())];
         let parent = random.below(link);
         write!(text, "<joint name=\"joint{link}\" type=\"{kind}\"><parent link=\"link{parent}\"/>").unwrap();
-        let (at, turned) = (point(random, 0.5), point(random, 3.0));
+        let (at, turned) = (point(random, 0.5 * scale), point(random, 3.0));
         write!(text, "<child link=\"link{link}\"/><origin xyz=\"{at}\" rpy=\"{turned}\"/>").unwrap();
         write!(text, "<axis xyz=\"{}\"/>", point(random, 1.0)).unwrap();
         if matches!(kind, "revolute" | "continuous" | "prismatic") {

@@ -120,3 +120,13 @@ fn parts_that_do_not_fit_are_refused() {
     negative.margins.push(("base".to_owned(), -1.0));
     assert!(matches!(Robot::from_parts(negative), Err(RobotError::Query(_))));
 }
+
+/// Without obstacles and margins, nothing but what may touch is other than the files say.
+#[test]
+fn parts_keep_what_may_touch() {
+    let folder = cbvh_testkit::folder();
+    let mut robot = described(folder.path());
+    robot.allow("turret", "hand").unwrap();
+    let mut other = Robot::from_parts(robot.to_parts()).unwrap();
+    assert_eq!(other.pairs(), robot.pairs());
+}

@@ -4,7 +4,7 @@ use crate::questions::{arm, at, block, random_values};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, shapes, to_bytes};
 use bvh_query::{Bvh, MotionOptions, OwnedShape, Pose};
-use cbvh_robot::{Base, Edge, Robot};
+use cbvh_robot::{Base, Edge, Robot, RobotMotion, RobotOptions};
 use cbvh_testkit::Random;
 
 /// An obstacle of some kind.
@@ -125,4 +125,63 @@ fn a_robot_forgets_what_it_moves_and_others_do_not() {
     });
     let after = robot.are_free(&edges, &options).unwrap();
     assert!(after != before && before.iter().zip(&after).all(|(before, after)| *after || !before));
+}
+
+/// Whether an edge is free does not depend on how a test of a pair places it: far from the origin, places in the world are rounded much
+/// more than those of one link seen from another.
+#[test]
+fn a_base_far_away_does_not_matter_to_what_it_carries() {
+    let folder = cbvh_testkit::folder();
+    let path = folder.path().join("far.urdf");
+    let text = r#"<robot name="far"><link name="base"/>
+      <link name="left"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>
+      <link name="right"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>
+      <joint name="one" type="prismatic"><parent link="base"/><child link="left"/><axis xyz="1 0 0"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+      <joint name="two" type="prismatic"><parent link="base"/><child link="right"/><axis xyz="1 0 0"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
+    std::fs::write(&path, text).unwrap();
+    let mut robot =
+        Robot::from_urdf(&path, &RobotOptions { base: Base::Planar, ..RobotOptions::default() }).unwrap();
+    let random = &mut Random::new(65);
+    let options = MotionOptions::default();
+    let (mut free, mut hit) = (0, 0);
+    for round in 0..400 {
+        let far = 1e9 * random.signed();
+        // They are 4e-8 apart or overlap, and the tolerance is 2e-8.
+        let apart = 0.02 + [4e-8, -1e-9][round % 2];
+        let start = [far, 1e9 * random.signed(), random.signed(), 0.0, apart];
+        let to = [far + 0.1, start[1], start[2], 0.0, apart];
+        let edge = Edge::straight(&start, &to).unwrap();
+        let is_free = robot.is_edge_free(&edge, &options).unwrap();
+        assert_eq!(is_free, robot.motion(&edge, &options).unwrap() == RobotMotion::Free, "round {round}");
+        assert_eq!(is_free, round % 2 == 0, "round {round}");
+        free += u32::from(is_free);
+        hit += u32::from(!is_free);
+    }
+    assert_eq!((free, hit), (200, 200));
+}
+
+/// The same where a place is not quite rigid: what a part looks like then depends on the frame in which a pair is tested.
+#[test]
+fn tests_of_pairs_are_made_in_the_frame_of_the_exact_questions() {
+    let larger = Pose::IDENTITY.rotation().map(|row| row.map(|x| x * (1.0 + 2f64.powi(-22))));
+    let options = MotionOptions::default();
+    let mut free = 0;
+    for step in -40..40 {
+        let mut robot = arm(Base::Floating);
+        robot.attach("tool", block([0.01; 3]), "hand", &at([0.0, 0.0, 1.0]), &[]).unwrap();
+        let mut values = vec![0.0; robot.joints().len()];
+        values[6] = 1.0;
+        // A wall above the tool.
+        let tip = robot.link_poses(&values).unwrap()[4].place([0.0, 0.0, 1.005]);
+        let gap = 1e-8 * f64::from(step);
+        let wall = Pose::new(larger, [tip[0], tip[1], tip[2] + gap + 1.0]).unwrap();
+        robot.add_obstacle("wall", block([2.0; 3]), &wall).unwrap();
+        let edge = Edge::straight(&values, &values).unwrap();
+        let is_free = robot.is_edge_free(&edge, &options).unwrap();
+        assert_eq!(is_free, robot.motion(&edge, &options).unwrap() == RobotMotion::Free, "gap {gap}");
+        free += u32::from(is_free);
+    }
+    assert!((1..80).contains(&free), "{free}");
 }
