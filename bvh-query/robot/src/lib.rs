@@ -7,7 +7,8 @@
 //!                                                  ├──> questions about configurations (questions, asker, rod)
 //!                                                  ├──> pairs that are near, with derivatives (near_pairs)
 //!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns),
-//!                                                  │      most of them by balls (screening, screen, cover, states, clearances, around)
+//!                                                  │      most of them by balls (screening, screen, cover, moments, states,
+//!                                                  │      clearances, around)
 //!                                                  ├──> plain data, and back (parts)
 //!                                                  └──> what programs draw (tree)
 //! ```
@@ -25,6 +26,7 @@ mod frame;
 mod lanes;
 mod mimic;
 mod model;
+mod moments;
 mod motions;
 mod near_pairs;
 mod options;

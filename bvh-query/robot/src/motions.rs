@@ -193,7 +193,7 @@ impl Asker {
         options.check()?;
         self.with_screening(|asker, screening| {
             let screen = screens.of(setting, &mut asker.querier)?;
-            let steps = screening.start(screen.0, setting, edge, &bounds);
+            let steps = screening.moments.start(screen.0, setting, edge, &bounds);
             let is_tested = options.clearance == 0.0;
             let test = &mut Touches { asker, setting, edge, bounds: &bounds, steps, is_tested, placed: None };
             if Search::new(screen, setting, screening, test).motion(options)? {
@@ -320,7 +320,7 @@ impl Asker {
         options.check()?;
         self.with_screening(|asker, screening| {
             let screen = screens.of(setting, &mut asker.querier)?;
-            let steps = screening.start(screen.0, setting, edge, &bounds);
+            let steps = screening.moments.start(screen.0, setting, edge, &bounds);
             let is_tested = false;
             let test = &mut Touches { asker, setting, edge, bounds: &bounds, steps, is_tested, placed: None };
             Search::new(screen, setting, screening, test).motion(options)?;

@@ -2,28 +2,19 @@
 
 use crate::clearances::Clearances;
 use crate::cover::Ball;
-use crate::edge::{Bounds, Edge, Turning, value};
 use crate::error::RobotError;
 use crate::frame::{Point, each, length};
-use crate::model::{Kind, Model};
+use crate::moments::{Moments, is_too_far};
 use crate::screen::{Screen, Screened};
 use crate::setting::Setting;
-use crate::states::{LANES, Points, States};
 use bvh_query::{MotionOptions, Querier};
 
-/// Where balls are in some states: what a thread needs to screen.
+/// What a thread needs to screen.
 #[derive(Default)]
 pub(crate) struct Screening {
-    states: States,
-    /// The middles of balls in all states, row by row, and for which question they were placed.
-    points: Vec<Points>,
-    placed: Vec<u32>,
-    question: u32,
+    pub(crate) moments: Moments,
     /// Where the balls around parts are in the middle, and how far from there they and their middles reach.
     middles: Vec<(Point, f64)>,
-    /// How each group moves, and whether one gets too far or turns too often for the roundings here.
-    moves: Vec<Move>,
-    is_far: bool,
     /// Pairs that may come near, and in which steps, a bit each.
     pub(crate) found: Vec<(usize, u64)>,
     /// Pairs that are likely to touch, and a step: by how near their balls are, as a part of the radius.
@@ -37,19 +28,6 @@ struct Likely {
     step: usize,
 }
 
-/// Bounds of the middles of a group's balls.
-#[derive(Clone, Copy, Default)]
-struct Move {
-    acceleration: f64,
-    rounding: f64,
-}
-
-/// The most steps of a motion: as many as a mask has bits.
-const MOST_STEPS: usize = 64;
-/// A step is short enough if the chord is off by this part of the radius of a small ball.
-const OFF: f64 = 0.4;
-/// Far more than the roundings of a step of a chain, of its sine and cosine, and of a ball's middle.
-const ROUNDING: f64 = 1.0 / (1u64 << 38) as f64;
 /// More than the relative error of arithmetic with bounds.
 const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
 /// Where the middle of a ball is so near to something, as a part of its radius, they may well touch.
@@ -60,85 +38,10 @@ const SURE: f64 = 0.8;
 const MOST_LIKELY: usize = 64;
 /// Less than what roundings leave of a difference of products.
 const ROUNDED_DOWN: f64 = 1.0 - 1.0 / (1u64 << 46) as f64;
-/// Motions that reach farther are left to the questions about pairs, which refuse those that reach too far.
-const MOST_REACH: f64 = (1u128 << 100) as f64;
-/// So do motions of larger angles, in radians.
-const MOST_ANGLE: f64 = (1u64 << 30) as f64;
 /// Far more than what is lost where exact questions count coordinates below 2^-213 as 0, and than what squares lose here.
 const FLUSHED: f64 = 1.0 / (1u128 << 100) as f64 / (1u128 << 100) as f64;
 /// How often a step's chord is cut where it is all that is left to cut.
 const CUTS: usize = 4;
-
-impl Screening {
-    /// Goes to the states between the steps of a motion. Returns the number of steps.
-    pub(crate) fn start(
-        &mut self,
-        screen: &Screen,
-        setting: &Setting,
-        edge: &Edge,
-        bounds: &[[Bounds; 2]],
-    ) -> usize {
-        let model = &*setting.model;
-        let fastest = self.follow(screen, model, bounds);
-        let short = OFF * screen.finest;
-        let mut steps = (0..=MOST_STEPS.ilog2()).map(|level| 1usize << level);
-        let steps =
-            steps.find(|steps| fastest / (8.0 * (steps * steps) as f64) <= short).unwrap_or(MOST_STEPS);
-        self.make_room(screen, model, steps + 1);
-        let time = |state: usize| state as f64 / steps as f64;
-        for (number, of) in edge.coefficients.iter().enumerate() {
-            self.states.set(number, |state| value(of, time(state)));
-        }
-        for joint in &model.joints {
-            if let Kind::Floating(first) = joint.kind {
-                let turning = Turning::of(edge, first);
-                for k in 0..4 {
-                    self.states.set(first + 3 + k, |state| turning.at(time(state))[k]);
-                }
-            }
-        }
-        self.states.place(model);
-        steps
-    }
-
-    /// Bounds how the groups move. Returns the largest acceleration.
-    fn follow(&mut self, screen: &Screen, model: &Model, bounds: &[[Bounds; 2]]) -> f64 {
-        self.moves.clear();
-        self.is_far = false;
-        let mut fastest = 0.0f64;
-        for group in 0..model.groups.len() {
-            let mut reach = screen.reach[group];
-            let (mut speed, mut of) = (0.0, Move { acceleration: 0.0, rounding: ROUNDING * reach });
-            for joint in model.above(group) {
-                let [turn, slide] = &bounds[joint];
-                of.acceleration += 2.0 * turn.rate * speed
-                    + (turn.rate * turn.rate + turn.acceleration) * reach
-                    + slide.acceleration;
-                speed += turn.rate * reach + slide.rate;
-                reach += length(model.joints[joint].origin.translation) + slide.way;
-                of.rounding += ROUNDING * (reach * (1.0 + turn.terms) + slide.terms);
-                self.is_far |= is_more(turn.terms, MOST_ANGLE);
-            }
-            of.acceleration *= ROUNDED_UP;
-            self.is_far |= is_more(reach, MOST_REACH);
-            fastest = fastest.max(of.acceleration);
-            self.moves.push(of);
-        }
-        fastest
-    }
-
-    /// Makes room for the balls in some states.
-    fn make_room(&mut self, screen: &Screen, model: &Model, states: usize) {
-        self.states.start(model, states);
-        self.points.resize(screen.balls.len() * self.states.rows, Points::default());
-        self.placed.resize(screen.balls.len(), 0);
-        self.question = self.question.wrapping_add(1);
-        if self.question == 0 {
-            self.placed.fill(0);
-            self.question = 1;
-        }
-    }
-}
 
 /// A question: a screen, and what it is asked about.
 pub(crate) struct Search<'a> {
@@ -168,7 +71,7 @@ impl<'a> Search<'a> {
         test: &'a mut dyn Test,
     ) -> Self {
         of.found.clear();
-        let steps = (of.states.count - 1).max(1);
+        let steps = of.moments.steps;
         Self { screen, fields, setting, of, test, steps, limit: 0.0 }
     }
 
@@ -179,7 +82,7 @@ impl<'a> Search<'a> {
         let MotionOptions { clearance, tolerance, .. } = *options;
         self.of.likely.clear();
         let all = mask(0, self.steps);
-        if self.of.is_far || fields.iter().any(|field| is_more(field.farthest, MOST_REACH)) {
+        if self.of.moments.is_far || fields.iter().any(|field| is_too_far(field.farthest)) {
             self.of.found.extend((0..self.setting.pairs.len()).map(|pair| (pair, all)));
             return Ok(false);
         }
@@ -248,7 +151,7 @@ impl<'a> Search<'a> {
     /// Returns what is added to the balls of parts that move, for a distance that must stay clear. Where the place of a part is not
     /// quite rigid, that distance depends on the frame as well.
     fn limit_of(&self, parts: &[&Screened], distance: f64) -> f64 {
-        let rounding: f64 = parts.iter().map(|part| self.of.moves[part.group].rounding).sum();
+        let rounding: f64 = parts.iter().map(|part| self.of.moments.moves[part.group].rounding).sum();
         let departure: f64 = parts.iter().map(|part| part.departure).sum();
         (distance + rounding) * (ROUNDED_UP + departure) + FLUSHED
     }
@@ -271,27 +174,20 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Places a ball in all states.
+    /// Places a ball at all moments.
     #[inline]
     fn place(&mut self, group: usize, ball: usize) {
-        if self.of.placed[ball] != self.of.question {
-            self.of.placed[ball] = self.of.question;
-            let rows = self.of.states.rows;
-            let to = &mut self.of.points[ball * rows..][..rows];
-            self.of.states.points(group, self.screen.balls[ball].centre, to);
-        }
+        self.of.moments.place(group, ball, self.screen.balls[ball].centre);
     }
 
     #[inline]
-    fn at(&self, ball: usize, state: usize) -> Point {
-        let points = &self.of.points[ball * self.of.states.rows + state / LANES];
-        each(|k| points[k][state % LANES])
+    fn at(&self, ball: usize, moment: usize) -> Point {
+        self.of.moments.at(ball, moment)
     }
 
     /// Returns how far a path is at most from the chord of some steps.
     fn off(&self, group: usize, steps: f64) -> f64 {
-        let time = steps / self.steps as f64;
-        self.of.moves[group].acceleration * (time * time / 8.0)
+        self.of.moments.off(group, steps)
     }
 
     /// Finds the steps in which a ball may come near what stands still.
@@ -447,11 +343,6 @@ fn larger(a: &Ball, b: &Ball) -> Option<usize> {
     }
 }
 
-/// Returns whether a number is more than another one, or none.
-fn is_more(number: f64, than: f64) -> bool {
-    number > than || number.is_nan()
-}
-
 /// Returns a bit for each step.
 pub(crate) fn mask(from: usize, to: usize) -> u64 {
     u64::MAX >> (64 - (to - from)) << from
@@ -485,7 +376,8 @@ fn is_beyond(a: &Point, b: &Point, distance: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::edge::bounds;
+    use crate::edge::{Edge, bounds};
+    use crate::model::Kind;
     use crate::options::Base;
     use crate::pair_path::{JointPaths, PairPath};
     use crate::robot::Robot;
@@ -518,7 +410,7 @@ mod tests {
         let bounds = bounds(&setting.model, edge);
         let screen = robot.screens.of(setting, &mut querier).unwrap();
         let mut screening = Screening::default();
-        let steps = screening.start(screen.0, setting, edge, &bounds);
+        let steps = screening.moments.start(screen.0, setting, edge, &bounds);
         let asked = &mut Nothing(Querier::new().unwrap());
         Search::new(screen, setting, &mut screening, asked).motion(options).unwrap();
         let joints = JointPaths::new(&setting.model, edge, &bounds);
