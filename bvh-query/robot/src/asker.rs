@@ -4,7 +4,7 @@ use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
 use crate::rod::are_within;
 use crate::screening::Screening;
-use crate::setting::{Pair, Part, Setting};
+use crate::setting::{OFF_RIGID, Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
 
 /// A pair that may be near: its bodies, how far the balls around its parts are apart, and its number.
@@ -70,9 +70,12 @@ impl Asker {
     }
 
     /// Returns how far apart the balls around both parts are at least; negative where they meet.
-    pub(crate) fn gap(&self, pair: &Pair) -> f64 {
+    pub(crate) fn gap(&self, setting: &Setting, pair: &Pair) -> f64 {
         let squared = squared_distance(&self.centres[pair.a], &self.centres[pair.b]);
-        squared.sqrt() - pair.reach - self.slack
+        let gap = squared.sqrt() - pair.reach - self.slack;
+        // In the frame of a place that is not quite rigid, the same gap has another length.
+        let departure = setting.parts[pair.a].departure + setting.parts[pair.b].departure;
+        if gap > 0.0 { gap / (1.0 + OFF_RIGID * departure) } else { gap }
     }
 
     /// Returns the frame of a part in the world.
@@ -183,7 +186,7 @@ impl Asker {
     /// Returns whether a pair touches if one of its parts, which is a closed surface, is a solid.
     fn touches_solid(&mut self, setting: &Setting, pair: &Pair, outer: usize) -> Result<bool, RobotError> {
         let shape = &setting.parts[outer].shape;
-        if self.gap(pair) > 0.0 || shape.shape().is_solid() {
+        if self.gap(setting, pair) > 0.0 || shape.shape().is_solid() {
             return Ok(false);
         }
         let relative = self.relative(setting, pair);
@@ -291,8 +294,12 @@ impl Asker {
 
     /// Returns the pairs by how far apart the balls around them are, the nearest first.
     fn by_gaps(&self, setting: &Setting) -> Vec<(f64, usize)> {
-        let mut order: Vec<(f64, usize)> =
-            setting.pairs.iter().enumerate().map(|(number, pair)| (self.gap(pair), number)).collect();
+        let mut order: Vec<(f64, usize)> = setting
+            .pairs
+            .iter()
+            .enumerate()
+            .map(|(number, pair)| (self.gap(setting, pair), number))
+            .collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         order
     }
@@ -321,7 +328,7 @@ pub(crate) fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> boo
     let middle = b_in_a.place(b.middle_of_box);
     let way = each(|k| middle[k] - a.middle_of_box[k]);
     let (turn, half_a, half_b) = (&b_in_a.rotation, &a.half, &b.half);
-    let size = half_a.iter().chain(half_b).chain(&a.middle_of_box).chain(&b.middle_of_box);
+    let size = half_a.iter().chain(half_b).chain(&a.middle_of_box).chain(&b.middle_of_box).chain(&way);
     // Columns of a rotation that is not rigid are not quite unit vectors, nor across each other.
     let off = ROUNDING + a.departure + b.departure;
     let slack = slack + off * size.map(|x| x.abs()).sum::<f64>();

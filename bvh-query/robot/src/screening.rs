@@ -381,7 +381,7 @@ mod tests {
     use crate::options::Base;
     use crate::pair_path::{JointPaths, PairPath};
     use crate::robot::Robot;
-    use crate::testing::{robot, scaled_tree, tree, values};
+    use crate::testing::{ball, robot, scaled_tree, slider, tree, values};
     use bvh_bake::mesh::Mesh;
     use bvh_bake::{Options, shapes, to_bytes};
     use bvh_query::{Bvh, OwnedShape, Pose, RigidPath};
@@ -433,19 +433,6 @@ mod tests {
             }
         }
         (left_out, kept, closest)
-    }
-
-    fn ball(radius: f64) -> OwnedShape {
-        let (bytes, _) = to_bytes(&shapes::point([0.0; 3]), &Options::default()).unwrap();
-        OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).rounded(radius).unwrap()
-    }
-
-    /// A robot without shapes, whose only joint slides along y from a place on x.
-    fn slider(at: f64) -> Robot {
-        let text = "<robot name=\"slider\"><link name=\"base\"/><link name=\"hand\"/><joint name=\"slide\" type=\"prismatic\">\
-                    <parent link=\"base\"/><child link=\"hand\"/><origin xyz=\"AT 0 0\"/><axis xyz=\"0 1 0\"/>\
-                    <limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>";
-        robot(&text.replace("AT", &at.to_string()), Base::Fixed)
     }
 
     /// In the frame of something whose place is not quite rigid, a clearance that is much larger than it has another length as well.

@@ -2,6 +2,8 @@
 
 use crate::options::{Base, RobotOptions};
 use crate::robot::Robot;
+use bvh_bake::{Options, shapes, to_bytes};
+use bvh_query::{Bvh, OwnedShape};
 use cbvh_testkit::Random;
 use std::fmt::Write;
 
@@ -63,4 +65,18 @@ pub(crate) fn values(random: &mut Random, robot: &Robot, far: f64) -> Vec<f64> {
         values[first..first + 4].copy_from_slice(&random.quaternion());
     }
     values
+}
+
+/// Makes a ball about the origin.
+pub(crate) fn ball(radius: f64) -> OwnedShape {
+    let (bytes, _) = to_bytes(&shapes::point([0.0; 3]), &Options::default()).unwrap();
+    OwnedShape::from(Bvh::from_bytes(bytes).unwrap()).rounded(radius).unwrap()
+}
+
+/// Makes a robot without shapes, whose only joint slides along y from a place on x.
+pub(crate) fn slider(at: f64) -> Robot {
+    let text = "<robot name=\"slider\"><link name=\"base\"/><link name=\"hand\"/><joint name=\"slide\" type=\"prismatic\">\
+                <parent link=\"base\"/><child link=\"hand\"/><origin xyz=\"AT 0 0\"/><axis xyz=\"0 1 0\"/>\
+                <limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    robot(&text.replace("AT", &at.to_string()), Base::Fixed)
 }
