@@ -1,10 +1,11 @@
 //! Asks about one configuration after the other: what a thread needs for itself.
 
+use crate::balls::Balls;
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, each};
 use crate::rod::are_within;
 use crate::screening::Screening;
-use crate::setting::{OFF_RIGID, Pair, Part, Setting};
+use crate::setting::{Pair, Part, Setting};
 use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
 
 /// A pair that may be near: its bodies, how far the balls around its parts are apart, and its number.
@@ -20,14 +21,15 @@ pub(crate) struct Asker {
     pub(crate) querier: Querier,
     /// The frames of groups of links, in the world.
     pub(crate) groups: Vec<Frame>,
-    /// The middles of the balls around the parts, in the world.
-    centres: Vec<Point>,
+    /// The balls around the parts, in the world.
+    pub(crate) balls: Balls,
     /// More than the roundings of these places.
     pub(crate) slack: f64,
     /// The pair that touched last. It is likely to touch again.
     likely: usize,
-    /// Memory for the pairs that may be near.
+    /// Memory for the pairs that may be near, and for their numbers.
     pub(crate) candidates: Vec<Candidate>,
+    pub(crate) near: Vec<usize>,
     /// What may come near.
     pub(crate) screening: Screening,
 }
@@ -51,31 +53,24 @@ impl Asker {
     }
 
     pub(crate) fn with(querier: Querier) -> Self {
-        let (groups, centres, candidates) = (Vec::new(), Vec::new(), Vec::new());
-        let screening = Screening::default();
-        Self { querier, groups, centres, slack: 0.0, likely: usize::MAX, candidates, screening }
+        Self {
+            querier,
+            groups: Vec::new(),
+            balls: Balls::default(),
+            slack: 0.0,
+            likely: usize::MAX,
+            candidates: Vec::new(),
+            near: Vec::new(),
+            screening: Screening::default(),
+        }
     }
 
     /// Goes to a configuration.
     pub(crate) fn place(&mut self, setting: &Setting, joints: &[f64]) -> Result<(), RobotError> {
         setting.model.check(joints)?;
         setting.model.place(joints, &mut self.groups);
-        self.centres.clear();
-        let groups = &self.groups;
-        self.centres.extend(setting.parts.iter().map(|part| groups[part.group].place(part.centre)));
-        let places = self.centres.iter().chain(groups.iter().map(|group| &group.translation));
-        let farthest = places.flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
-        self.slack = ROUNDING * farthest;
+        self.slack = ROUNDING * self.balls.place(&setting.layout, &self.groups);
         Ok(())
-    }
-
-    /// Returns how far apart the balls around both parts are at least; negative where they meet.
-    pub(crate) fn gap(&self, setting: &Setting, pair: &Pair) -> f64 {
-        let squared = squared_distance(&self.centres[pair.a], &self.centres[pair.b]);
-        let gap = squared.sqrt() - pair.reach - self.slack;
-        // In the frame of a place that is not quite rigid, the same gap has another length.
-        let departure = setting.parts[pair.a].departure + setting.parts[pair.b].departure;
-        if gap > 0.0 { gap / (1.0 + OFF_RIGID * departure) } else { gap }
     }
 
     /// Returns the frame of a part in the world.
@@ -92,8 +87,8 @@ impl Asker {
     #[inline]
     pub(crate) fn touches(&mut self, setting: &Setting, number: usize) -> Result<bool, RobotError> {
         let pair = &setting.pairs[number];
-        let reach = pair.reach + self.slack;
-        if squared_distance(&self.centres[pair.a], &self.centres[pair.b]) > reach * reach {
+        let reach = pair.reach(&setting.parts) + self.slack;
+        if self.balls.squared_distance([pair.a, pair.b]) > reach * reach {
             return Ok(false);
         }
         self.shapes_touch(setting, pair)
@@ -105,6 +100,9 @@ impl Asker {
             return Ok(touches);
         }
         let [a, b] = [pair.a, pair.b].map(|part| &setting.parts[part]);
+        if b.is_still && is_off_box(&self.balls.middle(pair.a), a, b, self.slack) {
+            return Ok(false);
+        }
         let relative = self.relative(setting, pair);
         if boxes_apart(&relative, a, b, self.slack) {
             return Ok(false);
@@ -135,30 +133,47 @@ impl Asker {
         if likely < setting.pairs.len() && self.touches(setting, likely)? {
             return Ok(true);
         }
-        for number in 0..setting.pairs.len() {
-            if number != likely && self.touches(setting, number)? {
-                self.likely = number;
-                return Ok(true);
+        self.among_near(setting, |asker, near| {
+            for &number in near.iter().filter(|&&number| number != likely) {
+                if asker.shapes_touch(setting, &setting.pairs[number])? {
+                    asker.likely = number;
+                    return Ok(true);
+                }
             }
-        }
-        Ok(false)
+            Ok(false)
+        })
+    }
+
+    /// Asks with the numbers of the pairs whose balls meet, in no order that means anything.
+    fn among_near<R>(
+        &mut self,
+        setting: &Setting,
+        ask: impl FnOnce(&mut Self, &mut [usize]) -> Result<R, RobotError>,
+    ) -> Result<R, RobotError> {
+        let mut near = std::mem::take(&mut self.near);
+        self.balls.list_near(&setting.layout, self.slack, &mut near);
+        let answer = ask(self, &mut near);
+        self.near = near;
+        answer
     }
 
     /// Returns pairs that touch, by their numbers: of each two bodies, the first pair that does.
     pub(crate) fn touching(&mut self, setting: &Setting, joints: &[f64]) -> Result<Vec<usize>, RobotError> {
         self.place(setting, joints)?;
-        let (mut touching, mut number) = (Vec::new(), 0);
-        while let Some(pair) = setting.pairs.get(number) {
-            number += 1;
-            if self.touches(setting, number - 1)? {
-                touching.push(number - 1);
-                // The others of these bodies do not matter, and come next.
-                let bodies = setting.bodies_of(pair);
-                let others = setting.pairs[number..].iter();
-                number += others.take_while(|other| setting.bodies_of(other) == bodies).count();
+        self.among_near(setting, |asker, near| {
+            near.sort_unstable();
+            let mut touching: Vec<usize> = Vec::new();
+            for &mut number in near {
+                let pair = &setting.pairs[number];
+                // The others of the same bodies do not matter, and come next.
+                let is_known =
+                    |&last: &usize| setting.bodies_of(&setting.pairs[last]) == setting.bodies_of(pair);
+                if !touching.last().is_some_and(is_known) && asker.shapes_touch(setting, pair)? {
+                    touching.push(number);
+                }
             }
-        }
-        Ok(touching)
+            Ok(touching)
+        })
     }
 
     /// Returns the parts of which one is inside the other without touching it, the inner one first: those that touch as soon as the
@@ -169,24 +184,28 @@ impl Asker {
         joints: &[f64],
     ) -> Result<Vec<[usize; 2]>, RobotError> {
         self.place(setting, joints)?;
-        let mut found = Vec::new();
-        for (number, pair) in setting.pairs.iter().enumerate() {
-            if self.touches(setting, number)? {
-                continue;
-            }
-            for [inner, outer] in [[pair.b, pair.a], [pair.a, pair.b]] {
-                if self.touches_solid(setting, pair, outer)? {
-                    found.push([inner, outer]);
+        self.among_near(setting, |asker, near| {
+            near.sort_unstable();
+            let mut found = Vec::new();
+            for &mut number in near {
+                let pair = &setting.pairs[number];
+                if asker.shapes_touch(setting, pair)? {
+                    continue;
+                }
+                for [inner, outer] in [[pair.b, pair.a], [pair.a, pair.b]] {
+                    if asker.touches_solid(setting, pair, outer)? {
+                        found.push([inner, outer]);
+                    }
                 }
             }
-        }
-        Ok(found)
+            Ok(found)
+        })
     }
 
     /// Returns whether a pair touches if one of its parts, which is a closed surface, is a solid.
     fn touches_solid(&mut self, setting: &Setting, pair: &Pair, outer: usize) -> Result<bool, RobotError> {
         let shape = &setting.parts[outer].shape;
-        if self.gap(setting, pair) > 0.0 || shape.shape().is_solid() {
+        if shape.shape().is_solid() {
             return Ok(false);
         }
         let relative = self.relative(setting, pair);
@@ -292,14 +311,9 @@ impl Asker {
         found
     }
 
-    /// Returns the pairs by how far apart the balls around them are, the nearest first.
+    /// Returns the pairs by how far apart the balls around them are at least, the nearest first.
     fn by_gaps(&self, setting: &Setting) -> Vec<(f64, usize)> {
-        let mut order: Vec<(f64, usize)> = setting
-            .pairs
-            .iter()
-            .enumerate()
-            .map(|(number, pair)| (self.gap(setting, pair), number))
-            .collect();
+        let mut order = self.balls.gaps(&setting.layout, self.slack);
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         order
     }
@@ -322,16 +336,25 @@ pub(crate) fn failed(setting: &Setting, pair: &Pair, source: QueryError) -> Robo
 /// More than what a chain of a hundred joints rounds, as a part of how far it is from the origin.
 const ROUNDING: f64 = 1.0 / (1u64 << 42) as f64;
 
+/// Returns whether the ball around a part, which has its middle here in the world, is apart from the box around one that stands still.
+fn is_off_box(middle: &Point, a: &Part, b: &Part, slack: f64) -> bool {
+    let at = b.origin.find(*middle);
+    let way = each(|k| (at[k] - b.middle_of_box[k]).abs());
+    let size = way[0] + way[1] + way[2] + b.size_of_box + a.radius;
+    let reach = a.radius + slack + (ROUNDING + a.departure + b.departure) * size;
+    let off = each(|k| (way[k] - b.half[k]).max(0.0));
+    off[0] * off[0] + off[1] * off[1] + off[2] * off[2] > reach * reach
+}
+
 /// Returns whether the boxes around two parts are apart along an axis of one, or along one that is across an axis of each (Gottschalk,
 /// Lin, Manocha, SIGGRAPH 1996).
 pub(crate) fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> bool {
     let middle = b_in_a.place(b.middle_of_box);
     let way = each(|k| middle[k] - a.middle_of_box[k]);
     let (turn, half_a, half_b) = (&b_in_a.rotation, &a.half, &b.half);
-    let size = half_a.iter().chain(half_b).chain(&a.middle_of_box).chain(&b.middle_of_box).chain(&way);
     // Columns of a rotation that is not rigid are not quite unit vectors, nor across each other.
     let off = ROUNDING + a.departure + b.departure;
-    let slack = slack + off * size.map(|x| x.abs()).sum::<f64>();
+    let slack = slack + off * (a.size_of_box + b.size_of_box + way[0].abs() + way[1].abs() + way[2].abs());
     let steep = each(|i| each(|j| turn[i][j].abs() + ROUNDING));
     let on_a =
         |i: usize| way[i].abs() > half_a[i] + (0..3).map(|j| steep[i][j] * half_b[j]).sum::<f64>() + slack;
@@ -346,11 +369,6 @@ pub(crate) fn boxes_apart(b_in_a: &Frame, a: &Part, b: &Part, slack: f64) -> boo
         (way[q] * turn[p][j] - way[p] * turn[q][j]).abs() > reach_a + reach_b + slack
     };
     (0..3).any(on_a) || (0..3).any(on_b) || (0..9).any(|axes| across(axes / 3, axes % 3))
-}
-
-fn squared_distance(a: &Point, b: &Point) -> f64 {
-    let way = each(|k| b[k] - a[k]);
-    way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
 }
 
 #[cfg(test)]
@@ -371,7 +389,7 @@ mod tests {
             Part::new(0, (0, false), Frame::IDENTITY, shape, 0.0).unwrap()
         };
         let parts: Vec<Part> = (0..24).map(part).collect();
-        let (mut querier, mut apart) = (Querier::new().unwrap(), 0);
+        let (mut querier, mut apart, mut off) = (Querier::new().unwrap(), 0, 0);
         for round in 0..2000 {
             let [a, b] = [(); 2].map(|()| &parts[random.below(parts.len())]);
             let frame = Frame::from_quaternion(random.quaternion(), random.point().map(|x| 0.8 * x));
@@ -381,7 +399,11 @@ mod tests {
             assert!(!is_apart || distance > 0.0, "round {round}: {distance}");
             assert!(is_apart || distance < 1e-9, "round {round}: {distance}");
             apart += u32::from(is_apart);
+            // The ball around B, seen from A.
+            let is_off = is_off_box(&frame.place(b.centre), b, a, 0.0);
+            assert!(!is_off || distance > 0.0, "round {round}: {distance}");
+            off += u32::from(is_off);
         }
-        assert!((500..1500).contains(&apart), "{apart}");
+        assert!((500..1500).contains(&apart) && off > apart / 3, "{apart} {off}");
     }
 }

@@ -17,6 +17,7 @@
 
 mod around;
 mod asker;
+mod balls;
 mod capsules;
 mod clearances;
 mod cover;

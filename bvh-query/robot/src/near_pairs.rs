@@ -108,12 +108,14 @@ impl Asker {
         self.place(setting, joints)?;
         let mut candidates = std::mem::take(&mut self.candidates);
         candidates.clear();
-        let candidate = |(number, pair): (usize, &Pair)| {
-            let gap = self.gap(setting, pair);
-            let bodies = [pair.a, pair.b].map(|part| setting.parts[part].body);
-            (gap <= margin).then_some(Candidate { bodies, gap, number })
+        let candidate = |(gap, number): (f64, usize)| {
+            (gap <= margin).then(|| Candidate {
+                bodies: setting.bodies_of(&setting.pairs[number]),
+                gap,
+                number,
+            })
         };
-        candidates.extend(setting.pairs.iter().enumerate().filter_map(candidate));
+        candidates.extend(self.balls.gaps(&setting.layout, self.slack).into_iter().filter_map(candidate));
         // By bodies, the nearest balls first. The order is already that of the bodies if each has one part.
         candidates.sort_unstable_by(|x, y| {
             x.bodies.cmp(&y.bodies).then(x.gap.total_cmp(&y.gap)).then(x.number.cmp(&y.number))

@@ -104,7 +104,7 @@ impl<'a> PairPath<'a> {
         let farthest = still(a) + still(b) + steps.iter().map(way).sum::<f64>();
         // NaN does not stay below anything.
         if farthest < MOST_REACH {
-            Ok(Self { joints, a, b, reach: pair.reach, steps })
+            Ok(Self { joints, a, b, reach: pair.reach(&setting.parts), steps })
         } else {
             Err(PoseError::TooFar(farthest).into())
         }

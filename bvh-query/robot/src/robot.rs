@@ -1,6 +1,7 @@
 //! A robot: reads it, and changes what stands around it and which pairs are asked about.
 
 use crate::asker::Asker;
+use crate::balls::Layout;
 use crate::capsules::join;
 use crate::error::RobotError;
 use crate::frame::Frame;
@@ -136,7 +137,8 @@ impl Robot {
         warnings.extend_from_slice(&of_meshes);
         warnings.append(&mut semantics.warnings);
         source.mesh_warnings = of_meshes;
-        let setting = Setting { model: Arc::new(model), parts, pairs: Vec::new(), bodies };
+        let (pairs, layout) = (Vec::new(), Layout::default());
+        let setting = Setting { model: Arc::new(model), parts, pairs, layout, bodies };
         let mut robot = Self {
             setting: Arc::new(setting),
             screens: Arc::default(),
@@ -331,6 +333,7 @@ impl Robot {
             part.place(origin);
             self.is_stale |= part.departure != before;
         }
+        setting.place_balls();
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! What questions are about: bodies, their shapes where they are, and the pairs that are asked about.
 
 use crate::around::Around;
+use crate::balls::Layout;
 use crate::cover::{Ball, cover};
 use crate::error::RobotError;
 use crate::frame::{Frame, Point, departure, length};
@@ -44,6 +45,8 @@ pub(crate) struct Part {
     /// The middle of the box around it, in its own frame, and half of the box's sides.
     pub(crate) middle_of_box: Point,
     pub(crate) half: Point,
+    /// The sum of both by their absolute coordinates.
+    pub(crate) size_of_box: f64,
     /// How far its place in the group is from a rigid one, as a part of lengths; 0 if that is no more than roundings.
     pub(crate) departure: f64,
     /// Of a ball, a capsule or a cylinder.
@@ -66,6 +69,7 @@ impl Part {
         let (middle_of_box, half) = bounds(shape.shape());
         let (middle, radius) = ball(shape.shape());
         let centre = origin.place(middle);
+        let size_of_box = middle_of_box.iter().chain(&half).map(|x| x.abs()).sum();
         let rods = rods_of(shape.shape(), &origin);
         Ok(Self {
             body,
@@ -80,6 +84,7 @@ impl Part {
             radius,
             middle_of_box,
             half,
+            size_of_box,
             departure: departure_of(&origin),
             rods,
             cover: Arc::default(),
@@ -124,13 +129,6 @@ fn departure_of(origin: &Frame) -> f64 {
     if departure < ROUNDED_UP - 1.0 { 0.0 } else { departure }
 }
 
-/// Returns the sum of the radii of the balls around two parts, and how much nearer to each other they may be than their balls tell
-/// where their places are not rigid. The world, where balls are compared, then differs from the frame of one of them, where shapes are.
-fn reach(a: &Part, b: &Part) -> f64 {
-    let off = |part: &Part| part.departure * (length(part.origin.translation) + length(part.middle));
-    (a.radius + b.radius) * (ROUNDED_UP + a.departure + b.departure) + off(a) + off(b)
-}
-
 /// Returns the middle of the box around a shape, and half of its sides.
 fn bounds(shape: Shape<'_>) -> (Point, Point) {
     let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -164,12 +162,21 @@ const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
 pub(crate) struct Pair {
     pub(crate) a: usize,
     pub(crate) b: usize,
-    /// The sum of the radii of both balls, or a little more.
-    pub(crate) reach: f64,
+}
+
+impl Pair {
+    /// Returns the sum of the radii of the balls around both parts, and how much nearer to each other they may be than their balls tell
+    /// where their places are not rigid. The world, where balls are compared, then differs from the frame of one of them, where shapes
+    /// are.
+    pub(crate) fn reach(&self, parts: &[Part]) -> f64 {
+        let [a, b] = [self.a, self.b].map(|part| &parts[part]);
+        let off = |part: &Part| part.departure * (length(part.origin.translation) + length(part.middle));
+        (a.radius + b.radius) * (ROUNDED_UP + a.departure + b.departure) + off(a) + off(b)
+    }
 }
 
 // A file of some hundred KiB may have 2^24 of them.
-const _: () = assert!(size_of::<Pair>() <= 24);
+const _: () = assert!(size_of::<Pair>() <= 16);
 
 /// What does not change while questions are asked: all threads share it.
 #[derive(Clone, Debug)]
@@ -177,6 +184,7 @@ pub(crate) struct Setting {
     pub(crate) model: Arc<Model>,
     pub(crate) parts: Vec<Part>,
     pub(crate) pairs: Vec<Pair>,
+    pub(crate) layout: Layout,
     pub(crate) bodies: Vec<Option<Body>>,
 }
 
@@ -196,7 +204,7 @@ impl Setting {
                         for (b, other) in (start..).zip(of_other) {
                             // An obstacle is asked about with all links, also with those that never move.
                             if one.group != other.group || one.is_still != other.is_still {
-                                pairs.push(Pair { a, b, reach: reach(one, other) });
+                                pairs.push(Pair { a, b });
                             }
                         }
                     }
@@ -205,7 +213,18 @@ impl Setting {
             }
             (rest, first) = (others, first + own.len());
         }
+        self.place_balls();
+        let departure = self.parts.iter().fold(0.0, |most: f64, part| most.max(part.departure));
+        let parts = |number: usize| [pairs[number].a, pairs[number].b];
+        let reach = |number: usize| pairs[number].reach(&self.parts);
+        self.layout.list(pairs.len(), parts, reach, 1.0 + OFF_RIGID * 2.0 * departure);
         self.pairs = pairs;
+    }
+
+    /// Takes where the balls around the parts are, after any of them has been moved in its group.
+    pub(crate) fn place_balls(&mut self) {
+        self.layout
+            .place(self.parts.iter().map(|part| ((!part.is_still).then_some(part.group), part.centre)));
     }
 
     /// Returns the bodies of a pair.
