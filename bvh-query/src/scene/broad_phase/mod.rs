@@ -115,7 +115,8 @@ impl BroadPhase {
         mut visit: impl FnMut(u32, u32, f64) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, QueryError> {
         for trees in [[&self.still, &self.still], [&self.moving, &self.still], [&self.moving, &self.moving]] {
-            if backend.run(NearPairs::new(trees, limit, budget, &mut visit))?.is_break() {
+            let search = NearPairs::new(trees, limit, budget, &mut visit);
+            if search.may_find() && backend.run(search)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }

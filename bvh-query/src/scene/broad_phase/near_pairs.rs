@@ -38,6 +38,13 @@ impl<'a, V: FnMut(u32, u32, f64) -> ControlFlow<()>> NearPairs<'a, V> {
         Self { trees, limits: (squared, squared_limit(squared)), budget, visit, open: Vec::new() }
     }
 
+    /// Returns whether there may be any, which often ends a search before it begins.
+    #[inline]
+    pub(super) fn may_find(&self) -> bool {
+        let [a, b] = self.trees;
+        a.root_groups().meet(b.root_groups()) && (std::ptr::eq(a, b) || a.root_gap(b) <= self.limits.0)
+    }
+
     /// Compares a part with the children of a node from a lane on, and then what is in those that are near.
     #[inline(always)]
     fn search<I: Isa>(
@@ -89,10 +96,7 @@ impl<V: FnMut(u32, u32, f64) -> ControlFlow<()>> Task for NearPairs<'_, V> {
     fn run<I: Isa>(mut self, isa: I) -> Self::Output {
         let [a, b] = self.trees;
         if !std::ptr::eq(a, b) {
-            let Some((part, other)) = a.whole().zip(b.whole()) else { return Ok(ControlFlow::Continue(())) };
-            if !part.groups.meet(other.groups) {
-                return Ok(ControlFlow::Continue(()));
-            }
+            let Some(part) = a.whole() else { return Ok(ControlFlow::Continue(())) };
             return self.search(isa, Facing { part, node: 0, is_swapped: false }, 0);
         }
         for node in a.nodes_with_pairs() {

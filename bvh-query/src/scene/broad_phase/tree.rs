@@ -113,19 +113,19 @@ impl Node {
     /// Computes what is around all children. Returns whether it has changed.
     fn unite(&mut self) -> bool {
         let bounds = OuterBox {
-            lo: self.lo.map(|ends| fold(ends, |x, y| if y < x { y } else { x })),
-            hi: self.hi.map(|ends| fold(ends, |x, y| if y > x { y } else { x })),
+            lo: self.lo.map(|ends| fold(ends, self.count, |x, y| if y < x { y } else { x })),
+            hi: self.hi.map(|ends| fold(ends, self.count, |x, y| if y > x { y } else { x })),
         };
-        let union = self.groups.iter().fold(Groups::NONE, |union, groups| union.union(*groups));
+        let union = self.groups[..self.count].iter().fold(Groups::NONE, |union, groups| union.union(*groups));
         let is_new = (bounds, union) != (self.bounds, self.union);
         (self.bounds, self.union) = (bounds, union);
         is_new
     }
 }
 
-/// Combines all lanes, half of them with the other half at a time.
-fn fold(mut ends: [f32; WIDTH], less: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut half = WIDTH / 2;
+/// Combines the first lanes, half of them with the other half at a time.
+fn fold(mut ends: [f32; WIDTH], count: usize, less: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut half = count.next_power_of_two() / 2;
     while half > 0 {
         for lane in 0..half {
             ends[lane] = less(ends[lane], ends[lane + half]);
@@ -159,6 +159,19 @@ impl Tree {
     pub(super) fn whole(&self) -> Option<Subtree> {
         let root = self.nodes.first()?;
         Some(Subtree { child: Child::Node(0), bounds: root.bounds, groups: root.union })
+    }
+
+    /// Returns the groups of all instances.
+    #[inline]
+    pub(super) fn root_groups(&self) -> Groups {
+        self.nodes.first().map_or(Groups::NONE, |root| root.union)
+    }
+
+    /// Returns the square of how far apart the boxes around two trees are at least; 0 if one is empty.
+    #[inline]
+    pub(super) fn root_gap(&self, other: &Self) -> f64 {
+        let [Some(a), Some(b)] = [self, other].map(|tree| tree.nodes.first()) else { return 0.0 };
+        a.bounds.to_world().squared_gap(&b.bounds.to_world())
     }
 
     /// Returns the numbers of the nodes in which pairs are to be found: those whose groups meet themselves.
