@@ -157,7 +157,8 @@ pub(crate) enum Part {
 fn rows_at<'a>(group: &'a Group, [a, b, c, d, ..]: &[u32; 16]) -> [[&'a [f32; 4]; 4]; 2] {
     let numbers = group.rows().as_flattened();
     let row = |start: u32| numbers[(start & 124) as usize..].first_chunk().unwrap_or(&[0.0; 4]);
-    [[*a, *b, *c, *d], [a ^ 64, b ^ 64, c ^ 64, d ^ 64]].map(|starts| starts.map(row))
+    // Not by `map`, which is not always compiled in place.
+    [[row(*a), row(*b), row(*c), row(*d)], [row(a ^ 64), row(b ^ 64), row(c ^ 64), row(d ^ 64)]]
 }
 
 /// Returns an integer that is smaller for smaller numbers; none is NaN.

@@ -7,18 +7,30 @@ use bvh_format::object::Object;
 /// Returns a lower bound of the distance of two objects by their bounding spheres, in mesh units. It is negative if the
 /// spheres overlap. Cost: a few nanoseconds.
 pub(super) fn sphere_gap(placement: &Placement, a: &Object, b: &Object) -> f64 {
-    let (a, b) = (a.volumes(), b.volumes());
-    let between = between(placement, a.sphere_centre, b.sphere_centre);
-    let squared: f64 = between.iter().map(|d| d * d).sum();
-    let radii = a.sphere_radius + b.sphere_radius;
-    // A pose may stretch by 2^-20 and the f64 error of a placed point is charged to the radii too.
-    let gap = squared.sqrt() * (1.0 - SLACK);
-    gap - radii * (1.0 + 2f64.powi(-19)) - 3.0 * placement.error
+    let (squared, radii, error) = spheres(placement, a, b);
+    squared.sqrt() * (1.0 - SLACK) - radii - error
 }
 
 /// Returns whether the bounding spheres or boxes of two objects show that the objects do not touch.
 pub(super) fn surely_apart(ObjectPair { placement, object_a, object_b, .. }: &ObjectPair<'_>) -> bool {
-    sphere_gap(placement, object_a, object_b) > 0.0 || boxes_apart(placement, object_a, object_b)
+    spheres_apart(placement, object_a, object_b) || boxes_apart(placement, object_a, object_b)
+}
+
+/// Returns whether [`sphere_gap`] is positive, but for roundings, without its root.
+fn spheres_apart(placement: &Placement, a: &Object, b: &Object) -> bool {
+    let (squared, radii, error) = spheres(placement, a, b);
+    // Squares that are as small as that are not rounded by a part of themselves.
+    squared > 2f64.powi(-900) && squared * (1.0 - 4.0 * SLACK) > (radii + error) * (radii + error)
+}
+
+/// Returns the square of how far apart the middles of two bounding spheres are, the sum of their radii, as a pose may stretch it by
+/// 2^-20, and the f64 error of a placed point.
+#[inline(always)]
+fn spheres(placement: &Placement, a: &Object, b: &Object) -> (f64, f64, f64) {
+    let (a, b) = (a.volumes(), b.volumes());
+    let [x, y, z] = between(placement, a.sphere_centre, b.sphere_centre);
+    let radii = a.sphere_radius + b.sphere_radius;
+    (x * x + y * y + z * z, radii * (1.0 + 2f64.powi(-19)), 3.0 * placement.error)
 }
 
 /// Returns whether the bounding boxes are apart along an axis of either: the separating axis test of Gottschalk, Lin and

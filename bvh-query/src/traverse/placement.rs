@@ -24,9 +24,10 @@ impl Placement {
         let (a, b) = (a.volumes(), b.volumes());
         let [x, y, z] = pose.translation();
         let placed = pose.place(b.origin);
+        let from_a = |axis: usize| placed[axis] - a.origin[axis];
         Self {
             rotation: *pose.rotation(),
-            translation: [0, 1, 2].map(|axis| placed[axis] - a.origin[axis]),
+            translation: [from_a(0), from_a(1), from_a(2)],
             // A's frame may stretch what B leaves out by 2^-19.
             error: (a.magnitude + b.magnitude + x.abs() + y.abs() + z.abs()) * POSE_ERROR
                 + (a.left_out + b.left_out * (1.0 + 1.0 / (1 << 18) as f64)),
@@ -51,7 +52,9 @@ impl Placement {
     #[inline(always)]
     pub(crate) fn place(&self, point: [f64; 3]) -> [f64; 3] {
         let (r, t) = (&self.rotation, &self.translation);
-        [0, 1, 2].map(|i| r[i][0] * point[0] + r[i][1] * point[1] + r[i][2] * point[2] + t[i])
+        let along = |i: usize| r[i][0] * point[0] + r[i][1] * point[1] + r[i][2] * point[2] + t[i];
+        // Not by `map`, which is not always compiled in place.
+        [along(0), along(1), along(2)]
     }
 
     /// Returns a direction of A's frame in B's frame.
