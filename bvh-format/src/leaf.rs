@@ -265,12 +265,15 @@ impl<'a> VertexBlock<'a> {
                 packed::places_of_lane(self.block, packet, lane)
             }
         };
-        [0, 1, 2].map(|corner| {
-            [0, 1, 2].map(|axis| {
+        // Not by `map`, which is not always compiled in place.
+        let mut vertices = [[0.0; 3]; 3];
+        for corner in 0..3 {
+            for axis in 0..3 {
                 let correction = axes[axis].get(bytes, places[corner]);
-                self.vertices.coordinate(axis, offsets[corner][axis], correction)
-            })
-        })
+                vertices[corner][axis] = self.vertices.coordinate(axis, offsets[corner][axis], correction);
+            }
+        }
+        vertices
     }
 }
 

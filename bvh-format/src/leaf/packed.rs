@@ -473,7 +473,7 @@ pub(super) fn decode_lane(block: &[u8], index: usize, lane: usize) -> [[f32; 3];
     let record = head.record(block, index);
     let slots = record.lane(lane);
     let mut integers = [[0; 16]; 3];
-    let places = slots.map(|slot| record.slot(slot.into()));
+    let places = [record.slot(slots[0].into()), record.slot(slots[1].into()), record.slot(slots[2].into())];
     if !head.with_two_loads(block, &places, &mut integers) {
         head.one_by_one(block, &places, &mut integers);
     }

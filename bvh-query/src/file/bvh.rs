@@ -374,8 +374,11 @@ impl Bvh {
         let offsets = decode_triangle(object.triangle_encoding(), block, packet, lane);
         let vertices = object.vertices();
         if vertices.are_sums() {
-            let origin = &vertices.origin;
-            return Ok(offsets.map(|v| [0, 1, 2].map(|axis| origin[axis] + f64::from(v[axis]))));
+            let mut sums = [vertices.origin; 3];
+            for (sum, offset) in sums.as_flattened_mut().iter_mut().zip(offsets.as_flattened()) {
+                *sum += f64::from(*offset);
+            }
+            return Ok(sums);
         }
         Ok(behind(object, block, page.header().packets.get().into(), (packet, lane), offsets))
     }

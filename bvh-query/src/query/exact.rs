@@ -80,5 +80,5 @@ impl Task for TriangleDistance<'_> {
 
 /// Returns a triangle of B, placed in A's frame.
 pub(super) fn placed(triangle: &Triangle, pose: &Pose) -> Triangle {
-    triangle.map(|corner| pose.place(corner))
+    [pose.place(triangle[0]), pose.place(triangle[1]), pose.place(triangle[2])]
 }
