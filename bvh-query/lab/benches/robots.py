@@ -34,17 +34,16 @@ ENDS = {
 
 
 class Pinocchio:
-    """The arm and its cell for Pinocchio, with the pairs that the robot of cbvh asks about."""
+    """The arm among obstacles for Pinocchio, those of the cell unless given, with the pairs that the robot of cbvh asks about."""
 
-    def __init__(self, arm, robot):
+    def __init__(self, arm, robot, obstacles=None):
         urdf, _, share = files_of(arm)
         self.model = model = pinocchio.buildModelFromUrdf(str(urdf), mimic=True)
         self.data = model.createData()
         kind = pinocchio.GeometryType.COLLISION
         self.geometry = of = pinocchio.buildGeomFromUrdf(model, str(urdf), kind, package_dirs=[share])
         body = [model.frames[part.parentFrame].name for part in of.geometryObjects]
-        for name, thing, pose in cell():
-            shape = coal.Box(*thing) if len(thing) == 3 else self.mesh(*thing)
+        for name, shape, pose in self.cell() if obstacles is None else obstacles:
             of.addGeometryObject(pinocchio.GeometryObject(name, 0, pinocchio.SE3(pose), shape))
             body.append(name)
         asked = {frozenset(pair) for pair in robot.pairs}
@@ -58,6 +57,10 @@ class Pinocchio:
             request.break_distance = request.security_margin = 0.0
         self.places = [model.joints[model.getJointId(name)].idx_q for name in robot.joints]
         assert model.nq == len(self.places)
+
+    @classmethod
+    def cell(cls):
+        return [(name, coal.Box(*of) if len(of) == 3 else cls.mesh(*of), pose) for name, of, pose in cell()]
 
     @staticmethod
     def mesh(vertices, faces):

@@ -1,4 +1,7 @@
-//! Scenes that need no files: two balls with bumps, and a pose for each distance.
+//! Benchmarks share two kinds of scenes: two balls with bumps, with a pose for each distance, which need no files, and arms among
+//! obstacles.
+
+pub mod scenes;
 
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes};
