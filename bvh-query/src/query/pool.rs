@@ -21,7 +21,8 @@ pub(crate) struct Pool {
     pub(crate) backend: Backend,
     /// The budget of each query.
     pub(crate) budget: u64,
-    idle: Mutex<Vec<Querier>>,
+    /// In boxes, because a querier takes some KiB, which would be copied whenever it is lent.
+    idle: Mutex<Vec<Box<Querier>>>,
 }
 
 impl Clone for Pool {
@@ -53,7 +54,7 @@ impl Pool {
     /// Lends a querier.
     fn lend<R>(&self, ask: impl FnOnce(&mut Querier) -> R) -> R {
         let idle = lock(&self.idle).pop();
-        let mut querier = idle.unwrap_or_else(|| Querier::with_backend(self.backend));
+        let mut querier = idle.unwrap_or_else(|| Box::new(Querier::with_backend(self.backend)));
         querier.set_budget(self.budget);
         let result = ask(&mut querier);
         lock(&self.idle).push(querier);
