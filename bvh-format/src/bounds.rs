@@ -14,7 +14,7 @@ use crate::page::decode::decode_page;
 use crate::page::{Page, RootRef};
 use crate::rule::Rule;
 use crate::treelet::Child;
-use crate::turning::{MAX_TRIANGLES, TurningSlab, decode_turning};
+use crate::turning::{MAX_TRIANGLES, TurningCodes, TurningSlab, decode_turning};
 use crate::validate::packets as packets_of;
 
 /// A child of a treelet or a subtree root of a page, with both of its bounds.
@@ -140,6 +140,18 @@ pub fn visit_bounds<'b>(
     page: &Page,
     leaf_block: &[u8],
     below: impl Fn(RootRef) -> &'b Subtree,
+    visit: impl FnMut(Bound) -> Result<(), FormatError>,
+) -> Result<Vec<Subtree>, FormatError> {
+    visit_with(object, page, leaf_block, object.profile.has_turning_slabs(), below, visit)
+}
+
+/// Visits as [`visit_bounds`] does. Without `patches`, no packets are kept but those of children that are packets.
+fn visit_with<'b>(
+    object: &Object,
+    page: &Page,
+    leaf_block: &[u8],
+    patches: bool,
+    below: impl Fn(RootRef) -> &'b Subtree,
     mut visit: impl FnMut(Bound) -> Result<(), FormatError>,
 ) -> Result<Vec<Subtree>, FormatError> {
     let (header, profile) = (page.header(), object.profile);
@@ -171,7 +183,7 @@ pub fn visit_bounds<'b>(
             tight[slot].join(&kdop, slabs);
         }
     }
-    let patches = profile.has_turning_slabs().then(|| Patches::of_page(page, &packets, &below));
+    let patches = patches.then(|| Patches::of_page(page, &packets, &below));
     for root in 0..header.roots {
         let decoded = page.anchor_slabs(root).to_kdop(slabs);
         let (tight, anchor) = (&tight[usize::from(root)], &Kdop::EMPTY);
@@ -213,7 +225,8 @@ pub fn visit_bounds<'b>(
 /// triangles of the page.
 ///
 /// Returns the page's subtrees, and how loose the slabs of the children are. The arguments are those of
-/// [`visit_bounds`].
+/// [`visit_bounds`], and whether any child of the object may have a turning slab: if none has, which [`has_turning_slabs`] tells of
+/// a page, no triangles are kept for them.
 ///
 /// # Errors
 /// Rule 35, if a decoded slab or the sphere cuts its triangles; rule 39, if a turning slab has too many; rule 49, if the
@@ -223,12 +236,14 @@ pub fn check_bounds<'b>(
     object: &Object,
     page: &Page,
     leaf_block: &[u8],
+    may_turn: bool,
     below: impl Fn(RootRef) -> &'b Subtree,
 ) -> Result<(Vec<Subtree>, Inflation), FormatError> {
     let slabs = object.profile.directions().slabs();
     let at = layout.page_offset(page.header().page_number.get());
     let (mut inflation, margins) = (Inflation::default(), object.vertices.margins());
-    let subtrees = visit_bounds(object, page, leaf_block, below, |bound| {
+    let patches = may_turn && object.profile.has_turning_slabs();
+    let subtrees = visit_with(object, page, leaf_block, patches, below, |bound| {
         let Bound { slot, child, decoded, turning, tight, anchor, patch } = bound;
         let place =
             || child.map_or_else(|| format!("slot {slot}"), |child| format!("slot {slot}, child {child}"));
@@ -262,6 +277,14 @@ pub fn check_bounds<'b>(
     Ok((subtrees, inflation))
 }
 
+/// Returns whether a child in a page may have a turning slab. The page need not have been checked.
+pub fn has_turning_slabs(page: &Page) -> bool {
+    page.profile().has_turning_slabs()
+        && (0..page.header().treelets).any(|slot| {
+            page.treelet(slot).first_chunk().is_some_and(|treelet| TurningCodes::read(treelet).any())
+        })
+}
+
 /// Checks that the box of an object's record contains its triangles, given those below its root.
 ///
 /// # Errors
@@ -289,21 +312,27 @@ impl Inflation {
     /// Adds a node, whose tight slabs were widened by margins. What is flat in a direction has no ratio there, and a point,
     /// which is flat in every direction, is not counted.
     pub fn add(&mut self, held: &Kdop, tight: &Kdop, slabs: usize, margins: &[f64; 13]) {
-        let ratio = |slab: usize| {
+        // All slabs at a time, those that are not there included, which compilers turn into vector code.
+        let (mut ratios, mut has_ratio) = ([0.0; 13], [false; 13]);
+        for slab in 0..13 {
             let [lo, hi] = [tight.lo[slab], tight.hi[slab]].map(f64::from);
             let (width, held) = (hi - lo, f64::from(held.hi[slab]) - f64::from(held.lo[slab]));
             // Both ends of what is flat are as far out as the margin, and were rounded by less than 2^-23 of themselves each.
-            let rounding = if margins[slab] > 0.0 { 2f64.powi(-22) * lo.abs().max(hi.abs()) } else { 0.0 };
-            (width > 2.0 * margins[slab] + rounding).then_some(held / width)
-        };
-        let (sum, count) =
-            (0..slabs).filter_map(ratio).fold((0.0, 0), |(sum, n), ratio| (sum + ratio, n + 1));
+            let largest = if lo.abs() > hi.abs() { lo.abs() } else { hi.abs() };
+            let rounding = if margins[slab] > 0.0 { 2f64.powi(-22) * largest } else { 0.0 };
+            (ratios[slab], has_ratio[slab]) = (held / width, width > 2.0 * margins[slab] + rounding);
+        }
+        let (mut sum, mut count) = (0.0, 0u32);
+        for slab in 0..slabs {
+            sum += if has_ratio[slab] { ratios[slab] } else { 0.0 };
+            count += u32::from(has_ratio[slab]);
+        }
         if count == 0 {
             return;
         }
         self.nodes += 1;
         self.width += sum / f64::from(count);
-        self.volume += (0..3).filter_map(ratio).product::<f64>();
+        self.volume += (0..3).filter(|&axis| has_ratio[axis]).map(|axis| ratios[axis]).product::<f64>();
     }
 
     /// Adds the sums of other nodes.

@@ -1,5 +1,6 @@
 //! The checksum that guards every part of a file: XXH3 with 64 bits and seed 0.
 
+use std::fmt::{self, Display, Formatter};
 use xxhash_rust::xxh3;
 
 /// Returns the checksum of `bytes`. It detects damage, but not forgery.
@@ -23,7 +24,17 @@ impl Hasher {
     }
 }
 
-/// Writes a checksum as 16 hexadecimal digits.
-pub(crate) fn hex(sum: u64) -> String {
-    format!("{sum:016x}")
+/// Shows a checksum as 16 hexadecimal digits.
+pub(crate) fn hex(sum: u64) -> Hex {
+    Hex(sum)
+}
+
+/// A checksum that is written only where an error shows it.
+#[derive(PartialEq)]
+pub(crate) struct Hex(u64);
+
+impl Display for Hex {
+    fn fmt(&self, formatter: &mut Formatter) -> fmt::Result {
+        write!(formatter, "{:016x}", self.0)
+    }
 }

@@ -146,6 +146,24 @@ pub fn decode_id(block: &[u8], packet: usize, lane: usize) -> u32 {
     least.wrapping_add(if lane == least_lane { 0 } else { offset })
 }
 
+/// Returns the ids of all lanes of a packet, as [`decode_id`] does one. Those of unused lanes mean nothing.
+pub(crate) fn decode_ids(block: &[u8], packet: usize) -> [u32; PACKET] {
+    let group = Group::read(block, packet / ID_GROUP);
+    let place = packet % ID_GROUP;
+    let (at, least_width, width) =
+        (group.packet(place), group.least_width.min(32), group.width(place).min(32));
+    let fields = load_bits(block, at);
+    let least = group.base.wrapping_add((fields & ((1 << least_width) - 1)) as u32);
+    let least_lane = (fields >> least_width) as usize & ((1 << LANE_BITS) - 1);
+    let others = at + least_width as usize + LANE_BITS;
+    let mut ids = [least; PACKET];
+    for other in 0..PACKET - 1 {
+        let lane = other + usize::from(other >= least_lane);
+        ids[lane] = least.wrapping_add(read_bits(block, others + other * width as usize, width));
+    }
+    ids
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,6 +178,7 @@ mod tests {
                 let block = encode_ids(&packets);
                 assert_eq!(id_block_bytes(&block, packets.len()), Some(block.len()));
                 for (p, ids) in packets.iter().enumerate() {
+                    assert_eq!(decode_ids(&block, p)[..ids.len()], ids[..]);
                     for (lane, &id) in ids.iter().enumerate() {
                         assert_eq!(decode_id(&block, p, lane), id, "spread {spread}, packet {p}");
                     }

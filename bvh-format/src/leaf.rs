@@ -138,7 +138,7 @@ impl WidePacket {
 /// Makes the leaf block of a page, in whole lines.
 ///
 /// `order` has the number of each packet once, with neighbours in space near each other. Vertices are stored in the
-/// order in which these packets first use them, so that the vertices of a packet are in few lines. If vertices are
+/// order in which these packets first use them, so that the vertices of a packet are in few lines. Plain packets need no order. If vertices are
 /// corrected, `wide` has the vertices of each packet. A coordinate that no correction gives back stays as predicted.
 pub fn encode_block(
     encoding: TriangleEncoding,
@@ -147,7 +147,7 @@ pub fn encode_block(
     vertices: &Vertices,
     wide: &[WidePacket],
 ) -> Vec<u8> {
-    debug_assert_eq!(packets.len(), order.len());
+    debug_assert!(encoding == TriangleEncoding::F32 || packets.len() == order.len());
     debug_assert_eq!(if vertices.are_corrected() { packets.len() } else { 0 }, wide.len());
     let (mut block, corrections) = match encoding {
         TriangleEncoding::F32 => (
@@ -279,7 +279,7 @@ impl<'a> VertexBlock<'a> {
 
 fn encode_f32(packets: &[Packet]) -> Vec<u8> {
     let mut block = Vec::with_capacity(packets.len() * F32_PACKET_BYTES + LINE);
-    packets.iter().for_each(|packet| block.extend_from_slice(bytemuck::bytes_of(packet)));
+    block.extend_from_slice(bytemuck::cast_slice(packets));
     block
 }
 

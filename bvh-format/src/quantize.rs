@@ -106,8 +106,15 @@ fn saturated(quotient: f32, last: u16) -> u16 {
 }
 
 /// Encodes four lower ends at a time, as `encode_min_outward` does one, with integer codes up to `last`. Each end must
-/// be at least the parent's. For upper ends, negate them and those of the parent.
-pub(crate) fn encode_four_outward(last: u16, ends: [f32; 4], parent: [f32; 4], unit: [f32; 4]) -> [u16; 4] {
+/// be at least the parent's. For upper ends, negate them and those of the parent. `inverse` is 1 / `unit`, rounded.
+#[inline(always)]
+pub(crate) fn encode_four_outward(
+    last: u16,
+    ends: [f32; 4],
+    parent: [f32; 4],
+    unit: [f32; 4],
+    inverse: [f32; 4],
+) -> [u16; 4] {
     /// 2^23: adding and subtracting it rounds to the nearest whole number.
     const ROUNDER: f32 = 8_388_608.0;
     let max_code = f32::from(last);
@@ -116,8 +123,8 @@ pub(crate) fn encode_four_outward(last: u16, ends: [f32; 4], parent: [f32; 4], u
     // Without branches, compilers turn the lanes into vector code.
     for lane in 0..4 {
         let fits = |code: f32| parent[lane] + code * unit[lane] <= ends[lane];
-        let quotient = (ends[lane] - parent[lane]) / unit[lane];
-        // In a flat slab 0 / 0 is NaN, and every code fits.
+        let quotient = (ends[lane] - parent[lane]) * inverse[lane];
+        // In a flat slab the product of 0 and infinity is NaN, and every code fits.
         let guess = (if quotient < max_code { quotient } else { max_code }) + ROUNDER - ROUNDER;
         let code = if fits(guess) { guess } else { guess - 1.0 };
         let next_fits = u32::from(fits(code + 1.0)) & u32::from(code < max_code);
@@ -127,13 +134,20 @@ pub(crate) fn encode_four_outward(last: u16, ends: [f32; 4], parent: [f32; 4], u
     }
     if unsettled != [0; 4] {
         // The rounding of large ends has moved a guess by more than one.
-        let fits = |lane: usize, code: u16| parent[lane] + f32::from(code) * unit[lane] <= ends[lane];
-        codes = std::array::from_fn(|lane| {
-            let gap = ends[lane] - parent[lane];
-            search(saturated(gap / unit[lane], last), last, |code| fits(lane, code))
-        });
+        return search_four(last, ends, parent, unit);
     }
     codes
+}
+
+/// The same for ends that need a search.
+#[cold]
+#[inline(never)]
+fn search_four(last: u16, ends: [f32; 4], parent: [f32; 4], unit: [f32; 4]) -> [u16; 4] {
+    let fits = |lane: usize, code: u16| parent[lane] + f32::from(code) * unit[lane] <= ends[lane];
+    std::array::from_fn(|lane| {
+        let gap = ends[lane] - parent[lane];
+        search(saturated(gap / unit[lane], last), last, |code| fits(lane, code))
+    })
 }
 
 #[cfg(test)]
@@ -160,7 +174,7 @@ mod tests {
                 if let Encoding::U4 | Encoding::U8 = encoding {
                     let last = if encoding == Encoding::U4 { 15 } else { 255 };
                     let (ends, parent) = ([lo, -hi, hi, parent_hi], [parent_lo, -parent_hi, lo, parent_hi]);
-                    let four = encode_four_outward(last, ends, parent, [unit; 4]);
+                    let four = encode_four_outward(last, ends, parent, [unit; 4], [1.0 / unit; 4]);
                     let third = encode_min_outward(encoding, hi, lo, unit);
                     let fourth = encode_min_outward(encoding, parent_hi, parent_hi, unit);
                     assert_eq!(four, [code_lo, code_hi, third, fourth]);
@@ -201,7 +215,8 @@ mod tests {
                 let unit = residual_unit(encoding, lo, hi, 7.0);
                 let ends = [0.3, 0.6, 0.999, 1.0].map(|share| (lo + share * (hi - lo)).clamp(lo, hi));
                 let one_by_one = ends.map(|end| encode_min_outward(encoding, end, lo, unit));
-                assert_eq!(encode_four_outward(last, ends, [lo; 4], [unit; 4]), one_by_one, "{lo:e} {hi:e}");
+                let four = encode_four_outward(last, ends, [lo; 4], [unit; 4], [1.0 / unit; 4]);
+                assert_eq!(four, one_by_one, "{lo:e} {hi:e}");
                 assert_eq!([decode_min(encoding, 0, lo, unit), decode_max(encoding, 0, hi, unit)], [lo, hi]);
                 // The last code misses the other end by a few roundings, one of them to 16 bits.
                 let width = f64::from(hi) - f64::from(lo);

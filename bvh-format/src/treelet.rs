@@ -330,58 +330,73 @@ pub(crate) struct SlabEncoder {
     profile: Profile,
     /// The decoded slabs of the treelet.
     pub(crate) parent: NodeSlabs,
-    /// The residual unit of each slab.
+    /// By slab: the residual unit and its inverse, and the lower and the negated upper end of the treelet. Lanes without a slab of
+    /// their own repeat the last one.
     units: [f32; 16],
+    inverses: [f32; 16],
+    lo: [f32; 16],
+    negated_hi: [f32; 16],
 }
 
 impl SlabEncoder {
     /// Prepares the units of a treelet.
     pub(crate) fn new(profile: Profile, f16_scale: f32, parent: &NodeSlabs) -> Self {
-        let mut units = [0.0; 16];
-        for slab in 0..profile.directions().slabs() {
-            let (lo, hi) = (parent.lo[row(slab)], parent.hi[row(slab)]);
-            units[slab] = residual_unit(profile.encoding(), lo, hi, f16_scale);
-        }
-        Self { profile, parent: *parent, units }
+        let last = profile.directions().slabs() - 1;
+        let rows: [usize; 16] = std::array::from_fn(|slab| row(slab.min(last)));
+        let (lo, hi) = (rows.map(|row| parent.lo[row]), rows.map(|row| parent.hi[row]));
+        let encoding = profile.encoding();
+        let units: [f32; 16] =
+            std::array::from_fn(|slab| residual_unit(encoding, lo[slab], hi[slab], f16_scale));
+        let (inverses, negated_hi) = (units.map(|unit| 1.0 / unit), hi.map(|hi| -hi));
+        Self { profile, parent: *parent, units, inverses, lo, negated_hi }
     }
 
     /// Writes the slabs of child `index`. The child's true k-DOP must lie within the treelet's decoded slabs, and its
     /// codes must be zero so far.
     pub(crate) fn encode(&self, index: usize, child: &Kdop, treelet: &mut [u8]) {
-        let Self { profile, ref parent, ref units } = *self;
+        let Self { profile, ref parent, ref units, .. } = *self;
         let encoding = profile.encoding();
         let slabs = profile.directions().slabs();
         let places = CodePlaces::new(profile, treelet, index);
-        let mut put = |slab: usize, code_lo: u16, code_hi: u16| {
+        let put = |treelet: &mut [u8], slab: usize, code_lo: u16, code_hi: u16| {
             places.write(treelet, slab, (code_lo, code_hi), (child.lo[slab], child.hi[slab]));
         };
         match encoding {
             Encoding::U4 | Encoding::U8 => {
                 let last = if encoding == Encoding::U4 { 15 } else { 255 };
-                for first in (0..slabs).step_by(4) {
-                    // Lanes without a slab of their own repeat the last one.
-                    let four: [usize; 4] = std::array::from_fn(|lane| (first + lane).min(slabs - 1));
-                    let unit = four.map(|slab| units[slab]);
-                    let (ends, parents) =
-                        (four.map(|slab| child.lo[slab]), four.map(|slab| parent.lo[row(slab)]));
-                    let codes_lo = encode_four_outward(last, ends, parents, unit);
-                    let (ends, parents) =
-                        (four.map(|slab| -child.hi[slab]), four.map(|slab| -parent.hi[row(slab)]));
-                    let codes_hi = encode_four_outward(last, ends, parents, unit);
-                    for lane in 0..4.min(slabs - first) {
-                        put(four[lane], codes_lo[lane], codes_hi[lane]);
-                    }
+                let end = |ends: &[f32; 13], slab: usize| ends[slab.min(slabs - 1)];
+                let lo: [f32; 16] = std::array::from_fn(|slab| end(&child.lo, slab));
+                let negated_hi: [f32; 16] = std::array::from_fn(|slab| -end(&child.hi, slab));
+                let (mut codes_lo, mut codes_hi) = ([0; 16], [0; 16]);
+                for four in 0..slabs.div_ceil(4) {
+                    let of = |lanes: &[f32; 16]| lanes.as_chunks::<4>().0[four];
+                    let (unit, inverse) = (of(units), of(&self.inverses));
+                    codes_lo.as_chunks_mut::<4>().0[four] =
+                        encode_four_outward(last, of(&lo), of(&self.lo), unit, inverse);
+                    codes_hi.as_chunks_mut::<4>().0[four] =
+                        encode_four_outward(last, of(&negated_hi), of(&self.negated_hi), unit, inverse);
                 }
+                if profile == Profile::Dop26U8Wide
+                    && let Some(treelet) = treelet.first_chunk_mut::<128>()
+                {
+                    let rows = treelet.as_chunks_mut::<4>().0;
+                    for slab in 0..13 {
+                        rows[row(slab)][index % 4] = codes_lo[slab] as u8;
+                        rows[16 + row(slab)][index % 4] = codes_hi[slab] as u8;
+                    }
+                    return;
+                }
+                (0..slabs).for_each(|slab| put(treelet, slab, codes_lo[slab], codes_hi[slab]));
             }
             Encoding::F16 => {
                 for slab in 0..slabs {
                     let (parent_lo, parent_hi) = (parent.lo[row(slab)], parent.hi[row(slab)]);
                     let code_lo = encode_min_outward(encoding, child.lo[slab], parent_lo, units[slab]);
                     let code_hi = encode_max_outward(encoding, child.hi[slab], parent_hi, units[slab]);
-                    put(slab, code_lo, code_hi);
+                    put(treelet, slab, code_lo, code_hi);
                 }
             }
-            Encoding::F32 => (0..slabs).for_each(|slab| put(slab, 0, 0)),
+            Encoding::F32 => (0..slabs).for_each(|slab| put(treelet, slab, 0, 0)),
         }
     }
 }

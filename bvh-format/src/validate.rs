@@ -13,7 +13,7 @@ pub use topology_in_pages::check_in_pages;
 use crate::checksum::{Hasher, hex};
 use crate::error::{FormatError, ensure, require};
 use crate::header::SectionKind;
-use crate::ids::decode_id;
+use crate::ids::decode_ids;
 use crate::instances::Instance;
 use crate::layout::{ContentHasher, Layout, PairsInOrder};
 use crate::leaf::{PACKET, PackedHead, Packet, TriangleEncoding, VertexBlock, decode_packet};
@@ -302,8 +302,9 @@ fn check_values(
         for lane in 0..if closed && !are_corrected { count } else { 0 } {
             sum = sum.wrapping_add(boundary_of(&values.triangle(lane), None));
         }
-        for lane in 0..if ids.is_empty() { 0 } else { count } {
-            let id = u64::from(decode_id(ids, usize::from(packet), lane));
+        let of_lanes = if ids.is_empty() { [0; PACKET] } else { decode_ids(ids, usize::from(packet)) };
+        for &id in &of_lanes[..if ids.is_empty() { 0 } else { count }] {
+            let id = u64::from(id);
             ensure(id < object.record.input_triangles.get(), Rule::IdRange, at + 32, || {
                 (format!("an id below {}", object.record.input_triangles), id.to_string())
             })?;

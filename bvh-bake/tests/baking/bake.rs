@@ -257,6 +257,32 @@ fn a_tightened_turning_slab_fails_the_proof() {
     assert!(changes > 100 && refused * 10 >= changes * 9, "{refused} of {changes}");
 }
 
+/// A file whose last page has no turning slabs is proved like any other, whatever the pages before it have.
+#[test]
+fn turning_slabs_are_proved_where_the_last_page_has_none() {
+    let (mut bytes, at) = ball_with_turning_slabs();
+    let pages = validate(&bytes).unwrap().objects[0].record().pages.get() as usize;
+    let inflation = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).unwrap();
+    let places = |bytes: &[u8], page: usize| {
+        let first = page + 64 * usize::from(bytes[page + 61]);
+        (0..usize::from(bytes[page + 59]))
+            .flat_map(move |slot| [28, 92, 56, 120].map(|row| first + 128 * slot + row))
+    };
+    let last = at + PAGE * (pages - 1);
+    let of_last: Vec<usize> = places(&bytes, last).collect();
+    assert!(of_last.iter().any(|&place| bytes[place] != 0));
+    of_last.iter().for_each(|&place| bytes[place..place + 4].fill(0));
+    repair_page(&mut bytes[last..last + PAGE]);
+    assert_eq!(prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).unwrap(), inflation);
+    // Some slab of an earlier page cuts its triangles.
+    let page = at + PAGE * (pages / 2);
+    let slab = places(&bytes, page).step_by(4).find(|&place| bytes[place] != 0).expect("a turning slab");
+    bytes[slab] = 255;
+    repair_page(&mut bytes[page..page + PAGE]);
+    let error = prove_bounds(&Layout::read(&bytes).unwrap(), &bytes[..]).unwrap_err();
+    assert_eq!(error.rule, Rule::BoundContains, "{error}");
+}
+
 /// A slab of a child with more triangles than a reader has to keep is refused, even one that contains them.
 #[test]
 fn a_turning_slab_over_too_many_triangles_fails_the_proof() {

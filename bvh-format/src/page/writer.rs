@@ -117,9 +117,9 @@ impl PageWriter {
             decoded_short: Vec::with_capacity(shape.short),
             begun: 0,
             remotes: 0,
-            packets: Vec::new(),
+            packets: Vec::with_capacity(shape.treelets * profile.width()),
             wide: Vec::new(),
-            ids: Vec::new(),
+            ids: Vec::with_capacity(shape.treelets * profile.width()),
             open: OpenTreelet {
                 at: 0,
                 bytes: 0,
@@ -247,7 +247,11 @@ impl PageWriter {
             ..PageHeader::new_zeroed()
         };
         write_header(&mut self.bytes, &header);
-        let order = packets_depth_first(&Page::new(&self.bytes, self.profile));
+        // Plain packets stay in their order.
+        let order = match encoding {
+            TriangleEncoding::F32 => Vec::new(),
+            _ => packets_depth_first(&Page::new(&self.bytes, self.profile)),
+        };
         let leaf_block = if none {
             Vec::new()
         } else {

@@ -50,7 +50,7 @@ pub fn decode(bytes: &[u8]) {
                 }
             }
             if checked.is_ok() && blocks {
-                let _ = check_bounds(&layout, object, &page, leaves, |_| Subtree::unknown());
+                let _ = check_bounds(&layout, object, &page, leaves, true, |_| Subtree::unknown());
             }
         }
     }

@@ -8,7 +8,7 @@
 use super::InParallel;
 use crate::progress::{Progress, Stage, Step};
 use crate::threads;
-use bvh_format::bounds::{Inflation, Subtree, check_bounds, check_box};
+use bvh_format::bounds::{Inflation, Subtree, check_bounds, check_box, has_turning_slabs};
 use bvh_format::object::Object;
 use bvh_format::page::{NO_PARENT, Page, RootRef, check_named_link};
 use bvh_format::source::{Block, PageBytes, Source};
@@ -76,15 +76,35 @@ pub(super) fn prove_object<S: Source + ?Sized>(
     structure: Option<Structure>,
     progress: &Progress,
 ) -> Result<Inflation, S::Error> {
+    // A turning slab is compared with all triangles below. They are kept from page to page only if the last page, which is at the
+    // bottom of the tree, has such slabs. Where others than the last have them, the pages are checked once more.
+    let last = layout.read_page(source, object.pages().end.saturating_sub(1))?;
+    let may_turn = has_turning_slabs(&last.page(object));
+    if let Some(inflation) = prove_pages(layout, source, object, &structure, may_turn, progress)? {
+        return Ok(inflation);
+    }
+    let inflation = prove_pages(layout, source, object, &structure, true, progress)?;
+    Ok(inflation.expect("all triangles are kept"))
+}
+
+/// Checks an object as [`prove_object`] does. Returns `None` if it comes upon a turning slab that it may not.
+fn prove_pages<S: Source + ?Sized>(
+    layout: &Layout,
+    source: &S,
+    object: &Object,
+    structure: &Option<Structure>,
+    may_turn: bool,
+    progress: &Progress,
+) -> Result<Option<Inflation>, S::Error> {
     let pages = object.pages();
-    let mut walk = Walk { layout, object, roots: HashMap::new(), inflation: Inflation::default() };
+    let mut walk = Walk { layout, object, may_turn, roots: HashMap::new(), inflation: Inflation::default() };
     let mut counts = Counts::default();
     let (topology, mut boundary) = (structure.as_ref().and_then(|structure| structure.topology), 0u64);
     let closed = topology.is_some_and(|topology| topology.closed);
     let mut end = pages.end;
     while end > pages.start {
         let start = end.saturating_sub(PAGES_PER_WINDOW).max(pages.start);
-        let window = if structure.is_some() {
+        let window: Vec<_> = if structure.is_some() {
             let validate = |number| validate_page(layout, source, object, closed, number);
             let checked = InParallel.each(start..end, validate)?;
             for page in checked.iter().rev() {
@@ -99,6 +119,9 @@ pub(super) fn prove_object<S: Source + ?Sized>(
                 Ok::<_, S::Error>((bytes, leaves))
             })?
         };
+        if !may_turn && window.iter().any(|(bytes, _)| has_turning_slabs(&bytes.page(object))) {
+            return Ok(None);
+        }
         walk.go_through(&Window { first: start, pages: window }, start..end)?;
         progress.add(Step::Bake(Stage::Prove), (end - start).into());
         end = start;
@@ -109,12 +132,14 @@ pub(super) fn prove_object<S: Source + ?Sized>(
     if let Some(topology) = topology {
         check_in_pages(layout, source, object, topology, boundary)?;
     }
-    Ok(walk.finish()?)
+    Ok(Some(walk.finish()?))
 }
 
 struct Walk<'a> {
     layout: &'a Layout,
     object: &'a Object,
+    /// Whether children may have turning slabs.
+    may_turn: bool,
     /// Roots of the pages that have been checked, until their links are reached.
     roots: HashMap<RootRef, Root>,
     inflation: Inflation,
@@ -143,7 +168,7 @@ impl Walk<'_> {
                 |root: RootRef| self.roots.get(&root).map_or(Subtree::unknown(), |root| &root.subtree);
             let check = |number: u32| {
                 let (page, leaves) = window.page(number, self.object);
-                check_bounds(self.layout, self.object, &page, leaves, below)
+                check_bounds(self.layout, self.object, &page, leaves, self.may_turn, below)
             };
             let results = InParallel.each(start..stop, check)?;
             for (number, (subtrees, sums)) in (start..stop).zip(results).rev() {
