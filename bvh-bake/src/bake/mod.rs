@@ -12,7 +12,7 @@ use crate::error::{BakeError, LimitError, excerpt};
 use crate::input::gather::Gatherer;
 use crate::input::gather::weld::check_length;
 use crate::input::mesh::{Instance, Mesh};
-use crate::options::{Options, Rounding};
+use crate::options::{Effort, Options, Rounding};
 use crate::pages::assemble::{Contents, assemble};
 use crate::pages::brick::EncodedObject;
 use crate::pages::unnumbered::ObjectPages;
@@ -46,7 +46,9 @@ use std::time::Instant;
 /// limit of the format, `MaxError` for an `Options::max_error` above a hundredth of the diagonal of an object's box, `Weld` for an
 /// `Options::weld` that is no finite length or exceeds that diagonal, and `Unproved` if the result fails its own checks.
 pub fn to_bytes(mesh: &Mesh, options: &Options) -> Result<(Vec<u8>, BakeReport), BakeError> {
-    to_bytes_with(mesh, options, "", &mut |_| ())
+    let count: usize = mesh.objects.iter().map(|object| object.triangles.len()).sum();
+    let pays = count as u64 <= threads::MAX_ALONE_TRIANGLES;
+    threads::alone_if(pays, || threads::enter(|| to_bytes_with(mesh, options, "", &mut |_| ())))
 }
 
 /// Bakes like `to_bytes`, with a provenance text (lines `key=value`, which are not part of the content) and a callback
@@ -66,7 +68,7 @@ pub fn to_bytes_with(
     mesh.check()?;
     let resources = Resources::unlimited(&Progress::default());
     let split = options.split_objects || !mesh.instances.is_empty();
-    let mut gatherer = Gatherer::new(&resources, split).rounding(options.round);
+    let mut gatherer = Gatherer::new(&resources, split).rounding(options.round).of_one_mesh();
     // A mesh in memory has no file name.
     gatherer.add_mesh(mesh).map_err(|halt| halt.in_file(Path::new("")))?;
     let mut output = Output::Memory(Vec::new());
@@ -91,12 +93,15 @@ fn bake(
     let provenance = &stating_moves(provenance, options);
     let gathered = gatherer.finish(options.weld, |name, diagonal| grid_error(options, name, diagonal))?;
     resources.progress.end_reading();
-    let mut baker = Baker::new(options, instances, id_end, resources);
-    let mut gathered = gathered.into_iter().peekable();
-    while gathered.peek().is_some() {
-        baker.add(next_batch(&mut gathered), begin)?;
-    }
-    Ok(BakeReport { warnings, ..baker.finish(provenance, output, begin)? })
+    let count: u64 = gathered.iter().map(|object| object.stream.count).sum();
+    threads::alone_if(count <= threads::MAX_ALONE_TRIANGLES, || {
+        let mut baker = Baker::new(options, instances, id_end, resources);
+        let mut gathered = gathered.into_iter().peekable();
+        while gathered.peek().is_some() {
+            baker.add(next_batch(&mut gathered), begin)?;
+        }
+        Ok(BakeReport { warnings, ..baker.finish(provenance, output, begin)? })
+    })
 }
 
 /// Checks the numbers of options that do not depend on the mesh.
@@ -251,8 +256,9 @@ impl<'a> Baker<'a> {
         begin(Stage::Prove);
         let (layout, inflation) = prove(&target.source(), progress)?;
         let topology = layout.read_topology(&target.source())?;
-        // A web page does not read the report, and asks the library instead.
-        let is_counted = !cfg!(all(target_family = "wasm", target_os = "unknown"));
+        // A web page does not read the report, and asks the library instead. Nor does a bake of little time count.
+        let is_counted =
+            options.effort != Effort::Fast && !cfg!(all(target_family = "wasm", target_os = "unknown"));
         let open_edges = match is_open {
             true if !is_counted => None,
             true => Some(count_all::<_, BakeError>(&layout, &target.source(), &counting.0, counting.1)?),

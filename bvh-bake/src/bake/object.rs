@@ -14,7 +14,7 @@ use crate::storage::Spill;
 use crate::storage::external_sort::Sorter;
 use crate::storage::resources::Resources;
 use crate::topology::{MAX_FEW_PARTS, Nets, Survey};
-use crate::tree::{Aabb, Bricks};
+use crate::tree::{Aabb, Bricks, Method, is_one_brick};
 use crate::triangles::{Gathered, Kept};
 use bvh_format::kdop::Kdop;
 use bvh_format::object::{F16_EXPONENTS, ObjectRecord};
@@ -104,15 +104,27 @@ impl Built {
         let Prepared { gathered, measured, mut surveyed, nets, left_out, .. } = prepared;
         let Gathered { name, behind, stream, moved, welded, is_cloud } = gathered;
         let moved = moved.joined(measured.moved).rounded_up();
-        let kept = Kept::new(&stream, &measured.dropped);
         let f16_exponent = f16_exponent(&measured.bounds);
-        let triangles = kept.count();
+        let triangles = Kept::new(&stream, &measured.dropped).count();
         let Choice { profile, encoding, reason } = choose(triangles, is_cloud, options);
         let grid = surveyed.grid.take();
         // Points have no extent, so that finer splits make no better tree of them.
-        let effort = if is_cloud { Effort::Fast } else { options.effort };
-        let bricks = Bricks::divide(&kept, &measured.bounds, grid, profile.width(), effort, resources)?;
-        drop(stream);
+        let method = match options.effort {
+            _ if is_cloud => Method::Coarse,
+            Effort::Fast => Method::Curve,
+            Effort::Default => Method::Fine,
+        };
+        let (width, bounds) = (profile.width(), &measured.bounds);
+        // A single brick takes the triangles as they are.
+        let is_whole = is_one_brick(triangles) && triangles == stream.count && stream.is_placed();
+        let bricks = if is_whole {
+            Bricks::of_one(stream.into_batches(), bounds, width, method)
+        } else {
+            let kept = Kept::new(&stream, &measured.dropped);
+            let bricks = Bricks::divide(&kept, bounds, grid, width, method, resources)?;
+            drop(stream);
+            bricks
+        };
         let origin = behind.are_corrected().then_some(behind.origin);
         let survey = nets.map(|nets| Survey::new(nets, bricks.boxes(), triangles, origin));
         let style = Style {
@@ -121,6 +133,7 @@ impl Built {
             f16_scale: 2f32.powi(f16_exponent),
             ids: options.ids,
             is_cloud,
+            is_quick: method == Method::Curve,
             behind,
         };
         let encoded = encode_object(bricks, style, survey, resources, &shared.spill)?;

@@ -227,7 +227,7 @@ struct OpenSection<'a> {
 
 impl OpenSection<'_> {
     fn write(&mut self, bytes: Vec<u8>) -> Result<(), BakeError> {
-        if self.waiting.is_empty() && bytes.len() >= MIN_WRITE_BYTES {
+        if self.waiting.is_empty() {
             self.waiting = bytes;
         } else {
             self.waiting.extend_from_slice(&bytes);

@@ -132,8 +132,8 @@ fn encode_brick(
     spill: &Spill,
 ) -> Result<EncodedBrick, BakeError> {
     let (width, slabs) = (style.profile.width(), style.profile.directions().slabs());
-    let mut arena = cut_brick(&tree, triangles, width, slabs, &style.behind, !style.is_cloud);
-    if style.profile.has_turning_slabs() && !style.is_cloud {
+    let mut arena = cut_brick(&tree, triangles, width, slabs, &style.behind, style.orders_lanes());
+    if style.profile.has_turning_slabs() && !style.is_cloud && !style.is_quick {
         turning::fit(&mut arena, triangles, style.behind.left_out);
     }
     drop(tree);

@@ -19,11 +19,18 @@ pub(crate) struct Style {
     pub(crate) ids: bool,
     /// Whether all triangles are points.
     pub(crate) is_cloud: bool,
+    /// Whether little time is spent on what makes queries faster.
+    pub(crate) is_quick: bool,
     /// How vertices follow from offsets.
     pub(crate) behind: Vertices,
 }
 
 impl Style {
+    /// Whether triangles of packets are put in the order in which they take the fewest bytes. Plain ones take the same in any order.
+    pub(crate) fn orders_lanes(&self) -> bool {
+        !(self.is_cloud || self.is_quick && self.encoding == TriangleEncoding::F32)
+    }
+
     /// Whether treelets of nothing but packets are short: where the size of triangles counts more than time, that of
     /// treelets does as well.
     pub(crate) fn has_short_treelets(&self) -> bool {

@@ -18,7 +18,6 @@ use bytemuck::{Pod, Zeroable};
 use std::cmp::Ordering;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
-use xxhash_rust::xxh3::xxh3_64;
 
 /// The hash of a triangle, upper half first, and the triangle's place in the stream.
 #[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
@@ -80,14 +79,21 @@ pub(crate) enum Found {
 /// Returns the hash of the triangle at a place. Triangles with the same vertices have the same offsets.
 #[inline]
 pub(crate) fn hashed(corners: &Corners, place: u64) -> Hashed {
-    // Each corner becomes one number: that takes three comparisons, where a sort takes many more instructions.
-    let numbers = corners.map(|corner| {
-        let [x, y, z] = corner.map(|value| u128::from(value.to_bits()));
-        x << 64 | y << 32 | z
-    });
-    let corners = canonical(numbers).0.map(|corner| [64, 32, 0].map(|shift| (corner >> shift) as u32));
-    let hash = xxh3_64(bytemuck::bytes_of(&corners));
+    // A sum of the hashes of corners does not depend on their order.
+    let of_corner = |corner: &[f32; 3]| {
+        let [x, y, z] = corner.map(|value| u64::from(value.to_bits()));
+        mixed(mixed(x << 32 | y).wrapping_add(z))
+    };
+    let hash = mixed(corners.iter().map(of_corner).fold(0, u64::wrapping_add));
     Hashed([(hash >> 32) as u32, hash as u32, place as u32])
+}
+
+/// Spreads the bits of a number: the upper half of its product with 2^64 over the golden ratio falls onto the lower half. Numbers
+/// that are 0 do not stay so.
+#[inline]
+fn mixed(number: u64) -> u64 {
+    let product = u128::from(number ^ 0x2545_f491_4f6c_dd1d) * 0x9e37_79b9_7f4a_7c15;
+    product as u64 ^ (product >> 64) as u64
 }
 
 /// Returns corners in a fixed order.

@@ -20,6 +20,12 @@ impl<T: Pod> Stream<T> {
         Self { pieces: Vec::new(), tail: Vec::new(), piece: piece.max(1), count: 0 }
     }
 
+    /// Makes a finished stream of pieces.
+    pub(crate) fn of_stored(pieces: Vec<Piece<T>>) -> Self {
+        let count = pieces.iter().map(|piece| piece.len() as u64).sum();
+        Self { pieces, tail: Vec::new(), piece: 1, count }
+    }
+
     /// Returns the number of records added so far.
     pub(crate) fn count(&self) -> u64 {
         self.count

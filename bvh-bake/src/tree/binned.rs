@@ -135,7 +135,7 @@ impl Builder {
 }
 
 /// Estimates the nodes of a tree of `triangles` triangles. Packets hold more than three triangles on average.
-fn expected_nodes(triangles: usize) -> usize {
+pub(super) fn expected_nodes(triangles: usize) -> usize {
     triangles * 5 / 8 + 1
 }
 
@@ -167,7 +167,7 @@ fn fill_bins(references: &[Reference], binning: &Binning<BINS_PER_AXIS>) -> Bins
 
 /// Moves one side to the front; both sides keep their order. Returns the length of the first side and the boxes of
 /// the centres of each side.
-fn partition(
+pub(super) fn partition(
     references: &mut [Reference],
     scratch: &mut [Reference],
     is_left: impl Fn(f32x4) -> bool,

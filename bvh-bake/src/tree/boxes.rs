@@ -112,6 +112,15 @@ impl Reference {
         Self(Aabb { lo: lesser(lanes), negated_hi: lesser(negated) })
     }
 
+    /// Makes a reference to something with a box.
+    pub(super) fn of_box(number: u32, bounds: &Aabb) -> Self {
+        let with_number = |ends: f32x4| {
+            let [x, y, z, _] = ends.to_array();
+            f32x4::new([x, y, z, f32::from_bits(number)])
+        };
+        Self(Aabb { lo: with_number(bounds.lo), negated_hi: with_number(bounds.negated_hi) })
+    }
+
     #[inline(always)]
     pub(super) fn triangle(&self) -> u32 {
         self.0.lo.as_array()[3].to_bits()
@@ -139,6 +148,13 @@ impl<const BINS: usize> Binning<BINS> {
         };
         let axes = |value: &dyn Fn(usize) -> f32| f32x4::new([value(0), value(1), value(2), 0.0]);
         Self { from: axes(&|axis| centres.lo(axis)), scale: axes(&scale) }
+    }
+
+    /// Makes bins that are as wide along all axes.
+    pub(super) fn of_cubes(centres: &Aabb) -> Self {
+        let extent = centres.extent(centres.longest());
+        let scale = if extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 };
+        Self { scale: f32x4::new([scale, scale, scale, 0.0]), ..Self::new(centres) }
     }
 
     /// Returns the bins of a centre, each less than `BINS`, which is a power of two.

@@ -271,10 +271,11 @@ fn best_plane(cells: &[Cell], parent: &Aabb, treelet: usize) -> Option<(usize, u
 mod tests {
     use super::*;
     use crate::progress::Progress;
+    use crate::tree::Method;
     use crate::tree::binary::{Content, NodeIndex};
     use crate::triangles::{Batch, Corners};
 
-    const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, reinsert: false };
+    const BUILDER: Builder = Builder { treelet: 16, brick: 100, sweep: 64, method: Method::Coarse };
 
     fn small(at: [f32; 3], size: f32) -> Corners {
         let [x, y, z] = at;

@@ -12,13 +12,13 @@ mod binary;
 mod binned;
 mod boxes;
 mod bricks;
+mod curve;
 mod reinsert;
 mod swept;
 pub(crate) mod treelets;
 pub(crate) mod turning;
 
 use crate::error::BakeError;
-use crate::options::Effort;
 use crate::progress::{Stage, Step};
 use crate::storage::resources::{MAX_BRICK_TRIANGLES, Resources};
 use crate::threads;
@@ -90,16 +90,26 @@ impl Bricks {
         bounds: &Aabb,
         grid: Option<Grid>,
         width: usize,
-        effort: Effort,
+        method: Method,
         resources: &Resources,
     ) -> Result<Self, BakeError> {
-        let builder = Builder::new(width, effort);
+        let builder = Builder::new(width, method);
         let spill = resources.scratch.spill();
         let (bricks, boxes) = (Vec::new(), Vec::new());
         let mut division = Division { builder: &builder, resources, spill: &spill, bricks, boxes };
         let top = division.divide(triangles, triangles.count(), bounds, grid)?;
         let (bricks, boxes) = (division.bricks, division.boxes);
         Ok(Self { bricks, boxes, top, builder })
+    }
+
+    /// Makes a single brick of all triangles, which are no more than it may have.
+    pub(crate) fn of_one(triangles: BatchStream, bounds: &Aabb, width: usize, method: Method) -> Self {
+        Self {
+            bricks: vec![triangles],
+            boxes: vec![*bounds],
+            top: Tree::leaf(0),
+            builder: Builder::new(width, method),
+        }
     }
 
     /// Returns a box of the triangles of each brick.
@@ -157,6 +167,20 @@ fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().expect("no thread panics while it holds the lock")
 }
 
+/// How the tree of a brick is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Method {
+    /// By clusters along a curve (`curve`), in the least time.
+    Curve,
+    /// By bins down to few triangles.
+    Coarse,
+    /// By bins down to a few dozen triangles; then subtrees move (`reinsert`).
+    Fine,
+}
+
+/// A brick of at most this many triangles stays as it is, because its triangles fit in a cache of a processor in any order.
+const MAX_UNORDERED_TRIANGLES: usize = 1 << 14;
+
 struct Builder {
     /// The number of triangles in a full treelet of leaves.
     treelet: usize,
@@ -164,26 +188,26 @@ struct Builder {
     brick: usize,
     /// Nodes of at most this many triangles are swept (`swept`).
     sweep: usize,
-    /// Whether subtrees move once a brick's tree is built.
-    reinsert: bool,
+    method: Method,
 }
 
 impl Builder {
-    fn new(width: usize, effort: Effort) -> Self {
-        let (sweep, reinsert) = match effort {
-            Effort::Fast => (16, false),
-            Effort::Default => (swept::MAX_SWEPT, true),
-        };
-        Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, reinsert }
+    fn new(width: usize, method: Method) -> Self {
+        let sweep = if method == Method::Fine { swept::MAX_SWEPT } else { 16 };
+        Self { treelet: PACKET * width, brick: MAX_BRICK_TRIANGLES, sweep, method }
     }
 
-    /// Takes the triangles of a brick out of their storage, builds their tree, and puts them in the order of its packets.
+    /// Takes the triangles of a brick out of their storage, builds their tree, and puts them in the order of its packets if they are
+    /// many.
     fn tree_of_brick(
         &self,
         brick: BatchStream,
     ) -> Result<(Tree<PacketTriangles>, Batch<'static>), BakeError> {
         let triangles = brick.take()?;
         let mut tree = self.tree(&triangles);
+        if triangles.len() <= MAX_UNORDERED_TRIANGLES {
+            return Ok((tree, triangles));
+        }
         // All later steps go from packet to packet, and would otherwise wait for far memory at each triangle.
         let mut order: Vec<u32> = Vec::with_capacity(triangles.len());
         for packet in tree.leaves_mut() {
@@ -197,7 +221,7 @@ impl Builder {
     /// Builds the tree of a brick.
     fn tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
         let tree = self.split_tree(triangles);
-        if !self.reinsert {
+        if self.method != Method::Fine {
             return tree;
         }
         // A copy of the tree would cost every bake time. Hardly any bake needs it, so that it is built again instead.
@@ -206,6 +230,9 @@ impl Builder {
 
     /// Builds the tree by splits, before any subtree is moved.
     fn split_tree(&self, triangles: &[Triangle]) -> Tree<PacketTriangles> {
+        if self.method == Method::Curve {
+            return curve::brick(self, triangles);
+        }
         let none = || vec![Reference::NONE; triangles.len()];
         let pays = triangles.len() > binned::MAX_SEQUENTIAL_TRIANGLES;
         let (mut references, mut scratch) = threads::join_if(pays, none, none);

@@ -160,9 +160,8 @@ impl Tree<PacketTriangles> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::options::Effort;
-    use crate::tree::Builder;
     use crate::tree::binary::TreeNode;
+    use crate::tree::{Builder, Method};
     use crate::triangles::{Corners, Triangle};
     use cbvh_testkit::Random;
 
@@ -209,7 +208,7 @@ mod tests {
         for triangles in [sticks(3000), sticks(30), vec![[[1.0, 2.0, 3.0]; 3]; 500]] {
             let triangles: Vec<Triangle> =
                 triangles.into_iter().zip(0..).map(|(corners, id)| Triangle { corners, id }).collect();
-            let mut tree = Builder::new(4, Effort::Fast).tree(&triangles);
+            let mut tree = Builder::new(4, Method::Coarse).tree(&triangles);
             let kept = packets(&tree);
             for one_in in [10, 1, 1] {
                 let before = cost(&tree);

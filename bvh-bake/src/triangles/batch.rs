@@ -3,7 +3,7 @@
 use super::{Exact, Triangle};
 use crate::error::BakeError;
 use crate::storage::resources::Resources;
-use crate::storage::{Spill, Stream};
+use crate::storage::{Piece, Spill, Stream};
 use std::borrow::Cow;
 use std::ops::{Deref, Range};
 
@@ -60,6 +60,11 @@ impl BatchStream {
         pieces
             .map(|piece| Self { triangles: Stream::of_pieces(piece), exact: Stream::of_pieces(piece) })
             .collect()
+    }
+
+    /// Makes a finished stream of triangles whose vertices follow from their offsets.
+    pub(crate) fn of_stored(pieces: Vec<Piece<Triangle>>) -> Self {
+        Self { triangles: Stream::of_stored(pieces), exact: Stream::of_stored(Vec::new()) }
     }
 
     pub(crate) fn count(&self) -> u64 {

@@ -23,8 +23,9 @@ impl Extent {
     pub(crate) fn add(&mut self, position: &[f64; 3]) {
         for axis in 0..3 {
             let value = position[axis];
-            self.lo[axis] = self.lo[axis].min(value);
-            self.hi[axis] = self.hi[axis].max(value);
+            // `min` and `max` would take extra instructions for NaN, which does not occur here.
+            self.lo[axis] = if value < self.lo[axis] { value } else { self.lo[axis] };
+            self.hi[axis] = if value > self.hi[axis] { value } else { self.hi[axis] };
             self.all_f32[axis] &= f64::from(value as f32) == value;
         }
     }

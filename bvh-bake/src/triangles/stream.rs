@@ -3,7 +3,7 @@
 //! Each thread can hold a few parts in memory.
 
 use super::placement::{Moved, Placement};
-use super::{Batch, Exact, TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
+use super::{Batch, BatchStream, Exact, TRIANGLES_PER_PART, Triangle, Triangles, WideTriangle};
 use crate::error::BakeError;
 use crate::storage::{Piece, Spill};
 use crate::threads;
@@ -101,6 +101,20 @@ impl Part {
 }
 
 impl TriangleStream {
+    /// Whether all corners are placed, so that they are not placed anew each time they are read.
+    pub(crate) fn is_placed(&self) -> bool {
+        self.placement.is_none() && self.parts.iter().all(|part| matches!(part, Part::Narrow(_)))
+    }
+
+    /// Returns all triangles of a placed stream without copying them.
+    pub(crate) fn into_batches(self) -> BatchStream {
+        let pieces = self.parts.into_iter().map(|part| match part {
+            Part::Narrow(piece) => piece,
+            Part::Wide(_) => unreachable!("the stream is placed"),
+        });
+        BatchStream::of_stored(pieces.collect())
+    }
+
     /// Places all corners at once if all triangles are in memory, because otherwise every pass would place them again.
     /// Returns the stream and how far the corners moved if it placed them. Triangles whose vertices do not follow from their
     /// offsets stay as they were read.

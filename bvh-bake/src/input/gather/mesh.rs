@@ -22,12 +22,15 @@ impl Gatherer<'_> {
             ..instance.clone()
         });
         self.instances.extend(placed);
-        for (number, places) in self.runs_of(mesh) {
+        let runs = self.runs_of(mesh);
+        let (count, split) = (runs.len(), self.split);
+        for (run, (number, places)) in runs.into_iter().enumerate() {
+            let are_last = self.is_only_mesh && (split || run + 1 == count);
             let object = &mesh.objects[number];
             let (triangles, ids) = (&object.triangles[places.clone()], &object.triangle_ids[places]);
             let corners_of = |place: usize| triangles[place].map(|vertex| object.positions[vertex as usize]);
             let id_of = |place: usize| (first_id + u64::from(ids[place])) as u32;
-            self.add_numbered(first + number, triangles.len(), corners_of, id_of)?;
+            self.add_numbered(first + number, triangles.len(), are_last, corners_of, id_of)?;
             let end = ids.last().map_or(0, |&id| first_id + u64::from(id) + 1);
             self.id_end = self.id_end.max(end);
         }

@@ -63,6 +63,8 @@ pub(crate) struct Gatherer<'a> {
     runs: Option<ObjectRuns>,
     /// The warnings of the readers.
     warnings: Vec<String>,
+    /// Whether nothing follows a mesh that is added.
+    is_only_mesh: bool,
 }
 
 /// The triangles of one future tree.
@@ -104,12 +106,18 @@ impl<'a> Gatherer<'a> {
             id_end: 0,
             runs: None,
             warnings: Vec::new(),
+            is_only_mesh: false,
         }
     }
 
     /// Makes a gatherer that joins all objects into one and records which triangles belong to which object.
     pub(crate) fn in_input_order(resources: &'a Resources) -> Self {
         Self { runs: Some(ObjectRuns::new()), ..Self::new(resources, false) }
+    }
+
+    /// Promises that nothing follows the mesh that is added first.
+    pub(crate) fn of_one_mesh(self) -> Self {
+        Self { is_only_mesh: true, ..self }
     }
 
     /// Sets how coordinates are rounded.
@@ -234,16 +242,18 @@ impl<'a> Gatherer<'a> {
         corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
     ) -> Result<(), Halt> {
         let first = self.id_end;
-        self.add_numbered(object, count, corners_of, |place| (first + place as u64) as u32)?;
+        self.add_numbered(object, count, false, corners_of, |place| (first + place as u64) as u32)?;
         self.id_end += count as u64;
         Ok(())
     }
 
-    /// Adds triangles to an object, and rounds their coordinates. -0.0 becomes 0.0. Ids must ascend within a body.
+    /// Adds triangles to an object, and rounds their coordinates. -0.0 becomes 0.0. Ids must ascend within a body. `are_last` says that
+    /// the body gets no others.
     fn add_numbered(
         &mut self,
         object: usize,
         count: usize,
+        are_last: bool,
         corners_of: impl Fn(usize) -> [[f64; 3]; 3] + Sync,
         id_of: impl Fn(usize) -> u32 + Sync,
     ) -> Result<(), Halt> {
@@ -269,6 +279,7 @@ impl<'a> Gatherer<'a> {
             spare: 0,
         };
         let fill_open = |body: &mut Body, places: Range<usize>| {
+            body.open.reserve(places.len());
             for place in places {
                 let mut triangle = triangle(place, &mut body.moved);
                 body.is_cloud &= body.extent.add_triangle(&mut triangle.corners, &mut body.moved);
@@ -276,7 +287,9 @@ impl<'a> Gatherer<'a> {
             }
         };
         let mut done = 0;
-        if !body.open.is_empty() || count < TRIANGLES_PER_PART {
+        // A last part that is not full need not wait for others.
+        let least = if are_last && body.open.is_empty() { 1 } else { TRIANGLES_PER_PART };
+        if !body.open.is_empty() || count < least {
             done = count.min(TRIANGLES_PER_PART - body.open.len());
             fill_open(body, 0..done);
             if body.open.len() == TRIANGLES_PER_PART {
@@ -284,19 +297,18 @@ impl<'a> Gatherer<'a> {
                 body.parts.push(part(open, spill)?);
             }
         }
-        let full =
-            (done..count).step_by(TRIANGLES_PER_PART).take_while(|start| count - start >= TRIANGLES_PER_PART);
+        let full = (done..count).step_by(TRIANGLES_PER_PART).take_while(|start| count - start >= least);
         let full: Vec<usize> = full.collect();
         for batch in full.chunks(self.resources.reading_tasks(BYTES_PER_OPEN_PART)) {
             let filled = threads::map(batch, |&start| {
-                let places = start..start + TRIANGLES_PER_PART;
+                let places = start..count.min(start + TRIANGLES_PER_PART);
                 let (mut extent, mut moved, mut is_cloud) = (Extent::EMPTY, Moved::default(), true);
                 let mut measured = |place: usize| {
                     let mut triangle = triangle(place, &mut moved);
                     is_cloud &= extent.add_triangle(&mut triangle.corners, &mut moved);
                     triangle
                 };
-                let part = match all_narrow(TRIANGLES_PER_PART, places.clone().map(&mut measured)) {
+                let part = match all_narrow(places.len(), places.clone().map(&mut measured)) {
                     Some(triangles) => Part::Narrow(spill.put(triangles)?),
                     None => Part::Wide(spill.put(places.map(measured).collect())?),
                 };
@@ -310,7 +322,7 @@ impl<'a> Gatherer<'a> {
                 body.moved = body.moved.joined(moved);
             }
         }
-        done += full.len() * TRIANGLES_PER_PART;
+        done = count.min(done + full.len() * TRIANGLES_PER_PART);
         fill_open(body, done..count);
         Ok(())
     }
