@@ -9,6 +9,7 @@ use crate::common::{
     stored, translation,
 };
 use bvh_bake::mesh::Mesh;
+use bvh_bake::{Effort, Options};
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Distance, Pose, Querier};
@@ -82,6 +83,33 @@ fn random_poses() {
         // The poses range from deep inside to a few sizes away.
         let poses = [0.3, 1.0, 1.5, 2.0, 4.0].map(|reach| random_pose(&mut random, reach));
         check(&files[a], &files[b], &poses);
+    }
+}
+
+/// The time spent on a tree changes no answer. Half of the meshes have crowds of triangles in a corner that a grid over the whole
+/// does not divide, so that trees of little time have to do it otherwise.
+#[test]
+fn random_meshes_of_every_effort() {
+    let mut random = Random::new(29);
+    for round in 0..12 {
+        let [a, b] = [0, 1].map(|side| {
+            let count = 1 + random.below([5, 60, 400, 900][(round + side) % 4]);
+            let seed = random.bits();
+            let mut triangles = match random.below(3) {
+                0 => dirty(&soup(count, seed), seed),
+                1 => soup(count, seed),
+                _ => terrain(1 + (count as f64 / 2.0).sqrt() as usize, seed % 1000),
+            };
+            if round % 2 == 1 {
+                triangles.extend(moved(&soup(count.min(200), seed + 1), 1e-5, [0.5, -0.25, 0.75]));
+            }
+            let mesh = mesh(&triangles);
+            let options = Effort::ALL.map(|effort| Options::default().effort(effort));
+            let packed = options[0].clone().triangles(Some(TriangleEncoding::Packed)).topology(false);
+            options.iter().chain([&packed]).map(|options| bake(&mesh, options)).collect::<Vec<_>>()
+        });
+        let poses = [0.1, 0.8, 2.5].map(|reach| random_pose(&mut random, reach));
+        check(&a, &b, &poses);
     }
 }
 
