@@ -10,7 +10,9 @@ mod message;
 mod timed;
 
 use crate::asking;
+use crate::bake;
 use crate::console::{Failure, Record, record};
+use bvh_bake::Effort;
 use bvh_query::Querier;
 use clap::Args;
 use meshes::Meshes;
@@ -24,7 +26,7 @@ Examples:
   python spec/suite/run.py --runner 'cbvh suite'
 
 spec/suite/PROTOCOL.md defines the lines that the command reads and writes. Meshes are baked in memory with the default \
-options. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
+options, or with --effort fast in less time. Those of timed questions then have no topology, which these do not need. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
 
 /// What `suite` accepts.
 #[derive(Debug, Args)]
@@ -33,6 +35,10 @@ pub(crate) struct SuiteArguments {
     /// Instruction set of the queries: auto, scalar, avx2, avx512, neon or simd128
     #[arg(long, value_name = "ISA", default_value = "auto")]
     isa: String,
+
+    /// Time spent on a better tree: fast or default. Answers are the same
+    #[arg(long, value_name = "EFFORT", default_value = "default", value_parser = bake::effort)]
+    effort: Effort,
 }
 
 /// The version of the protocol.
@@ -46,7 +52,7 @@ const MAX_DISTANCE_ERROR_OF_SIZE: f64 = 1e-14;
 /// Answers each line of standard input with one line on standard output.
 pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
     let mut querier = Querier::with_backend(asking::backend(&arguments.isa)?);
-    let (mut meshes, mut fields) = (Meshes::default(), Fields::default());
+    let (mut meshes, mut fields) = (Meshes::of_effort(arguments.effort), Fields::default());
     let mut output = std::io::stdout().lock();
     for line in std::io::stdin().lock().split(b'\n') {
         let line = line.map_err(|error| Failure::System(format!("standard input: cannot read: {error}")))?;
@@ -64,7 +70,7 @@ pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
 /// Answers one line.
 fn answer(line: &[u8], meshes: &mut Meshes, fields: &mut Fields, querier: &mut Querier) -> Record {
     match serde_json::from_slice(line) {
-        Ok(Message::Hello(Hello { hello: PROTOCOL })) => hello(),
+        Ok(Message::Hello(Hello { hello: PROTOCOL })) => hello(meshes.settings()),
         Ok(Message::Hello(Hello { hello })) => {
             refusal(&format!("expected version {PROTOCOL} of the protocol, found {hello}"))
         }
@@ -99,12 +105,12 @@ fn about(what: Record, answer: Result<Record, String>) -> Record {
 }
 
 /// States what the command claims.
-fn hello() -> Record {
+fn hello(settings: &str) -> Record {
     record! {
         hello: PROTOCOL,
         name: "cbvh",
         version: env!("CARGO_PKG_VERSION"),
-        settings: "meshes baked in memory with the default options",
+        settings: settings,
         coordinates: "f64",
         placement: "f64",
         questions: ask::QUESTIONS,
