@@ -12,7 +12,7 @@ pub enum Effort {
     /// Clusters along a curve make the tree, children get no turning slabs, and the report does not count open edges. On the pairs of
     /// the suite, `collide` takes 1.05 times as long in the geometric mean, `contacts` and `distance` 1.10, rays 1.01. The pair that
     /// loses most takes 1.15 times as long, and the worst of all gaps of any pair 1.6: `distance` of two smooth meshes of 100,000
-    /// triangles, a tenth of the diagonal apart. Files take 1 to 7 % more bytes (AMD EPYC, Zen 3, 2026-11-29).
+    /// triangles, a tenth of the diagonal apart. Files take 3 to 7 % more bytes (AMD EPYC, Zen 3, 2026-11-29).
     Fast,
     /// Splits near the leaves are fine; then the largest tenth of all subtrees moves to better places.
     #[default]
