@@ -61,6 +61,10 @@ pub(crate) const CELL_ERROR: f64 = 1.0 / (1u64 << 49) as f64;
 /// off as well.
 pub(crate) const COMPOSED_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
+/// 2^-43: the quotients of a direction's components by the largest one. Where a pose has turned a direction, its components are off by
+/// 57 u of the largest one before, and by less than twice that, or 2^-45, of the largest one after.
+pub(crate) const DIRECTION_ERROR: f64 = 1.0 / (1u64 << 43) as f64;
+
 /// 2^-44: a path in the frame of another. A relative pose is off by less than 2^-46 of the magnitudes, for the point and both ends.
 pub(crate) const RELATIVE_ERROR: f64 = 1.0 / (1u64 << 44) as f64;
 

@@ -3,6 +3,7 @@
 use crate::error::{OpenError, QueryError};
 use crate::file::memory;
 use crate::file::place::{LeafPacket, TrianglePlace};
+use crate::file::ray_tree::{PLACE_BYTES, RaySlot};
 use crate::file::unpack::unpack;
 use crate::isa::Isa;
 use crate::narrow::Enclosed;
@@ -57,6 +58,8 @@ struct OpenFile {
     counted: Mutex<BTreeMap<usize, Arc<OpenEdges>>>,
     /// What objects enclose whose depth was queried, by their numbers.
     enclosed: Mutex<BTreeMap<usize, Enclosed>>,
+    /// The trees of rays, by the numbers of objects, once a ray has been asked about.
+    rays: OnceLock<Box<[RaySlot]>>,
     /// A number that no other open file of this process has or had.
     identity: u64,
 }
@@ -150,6 +153,7 @@ impl Bvh {
             topology,
             counted,
             enclosed,
+            rays: OnceLock::new(),
             identity,
         })))
     }
@@ -187,6 +191,21 @@ impl Bvh {
     /// Returns what objects are known to enclose.
     pub(super) fn known_enclosed(&self) -> &Mutex<BTreeMap<usize, Enclosed>> {
         &self.0.enclosed
+    }
+
+    /// Returns the place of the tree that rays walk, by the number of an object.
+    #[inline(always)]
+    pub(crate) fn ray_slot(&self, object: usize) -> &RaySlot {
+        let make = || self.objects().iter().map(|_| RaySlot::default()).collect();
+        &self.0.rays.get_or_init(make)[object]
+    }
+
+    /// Returns the plain packet at a place after the first byte of packets. Its leaf block has been checked.
+    #[inline(always)]
+    pub(crate) fn packet_at(&self, first: usize, place: u32) -> Option<&Packet> {
+        let start = first + PLACE_BYTES * place as usize;
+        let bytes: &[u8; F32_PACKET_BYTES] = self.0.bytes.get(start..)?.first_chunk()?;
+        bytemuck::try_from_bytes(bytes).ok()
     }
 
     /// Returns a number that no other open file of this process has or had.

@@ -9,6 +9,7 @@ mod memory;
 mod open_edges;
 pub(crate) mod owned_shape;
 pub(crate) mod place;
+pub(crate) mod ray_tree;
 pub(crate) mod shape;
 pub(crate) mod topology;
 mod triangles;

@@ -88,6 +88,7 @@ pub(crate) mod avx512;
 #[allow(unsafe_code, reason = "asks the CPU")]
 pub(crate) mod cache;
 pub(crate) mod corners;
+pub(crate) mod doubles;
 #[allow(unsafe_code, reason = "registers of the CPU; each block says why it is sound")]
 pub mod floats;
 #[cfg(target_arch = "aarch64")]
@@ -102,6 +103,7 @@ mod simd128;
 
 use bvh_format::slabs::Group;
 use corners::Corners;
+use doubles::Doubles;
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -176,14 +178,23 @@ pub(crate) trait Isa: Copy {
     type F32x4: Lanes;
     /// A register of `f64` for three corners.
     type F64x3: Corners;
+    /// A register of `f64` for four triangles.
+    type F64x4: Doubles;
     /// The rows of a group, in the form that `pick` reads.
     type Rows<'a>: Copy;
 
     fn corners(self, from: [f64; 3]) -> Self::F64x3;
+    /// Four `f32` as `f64`.
+    fn widen(self, from: &[f32; 4]) -> Self::F64x4;
+    fn splat_wide(self, value: f64) -> Self::F64x4;
 
     fn splat(self, value: f32) -> Self::F32x16;
     fn load(self, from: &[f32; 16]) -> Self::F32x16;
     fn store(self, value: Self::F32x16, to: &mut [f32; 16]);
+    /// The first eight lanes are `low`, the others `high`.
+    fn halves(self, low: &[f32; 8], high: &[f32; 8]) -> Self::F32x16;
+    /// The last eight lanes, followed by the first eight.
+    fn swap_halves(self, value: Self::F32x16) -> Self::F32x16;
     /// Lane `4 * i + j` is `from[i]`.
     fn repeat(self, from: &[f32; 4]) -> Self::F32x16;
     /// Lane `4 * i + j` is `from[j]`.

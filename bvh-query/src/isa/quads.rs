@@ -2,6 +2,7 @@
 //! register; the rest follows.
 
 use super::corners::Three;
+use super::doubles::FourDoubles;
 use super::{Isa, Lanes, Part, Task, in_order, rows_at};
 use bvh_format::slabs::Group;
 use std::marker::PhantomData;
@@ -130,11 +131,29 @@ impl<Q: Quad> Isa for Quads<Q> {
     type F32x16 = Four<Q>;
     type F32x4 = Q;
     type F64x3 = Three;
+    type F64x4 = FourDoubles;
     type Rows<'a> = &'a Group;
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> Three {
         Three::from(from)
+    }
+    #[inline(always)]
+    fn widen(self, from: &[f32; 4]) -> FourDoubles {
+        FourDoubles(from.map(f64::from))
+    }
+    #[inline(always)]
+    fn splat_wide(self, value: f64) -> FourDoubles {
+        FourDoubles([value; 4])
+    }
+    #[inline(always)]
+    fn halves(self, low: &[f32; 8], high: &[f32; 8]) -> Four<Q> {
+        let ([a, b], [c, d]) = (pair(low), pair(high));
+        Four(Q::load(a), Q::load(b), Q::load(c), Q::load(d))
+    }
+    #[inline(always)]
+    fn swap_halves(self, value: Four<Q>) -> Four<Q> {
+        Four(value.2, value.3, value.0, value.1)
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Four<Q> {
@@ -289,6 +308,13 @@ fn run_apart<Q: Quad, T: Task>(isa: Quads<Q>, task: T) -> T::Output {
 #[inline(always)]
 fn smaller(x: f32, y: f32) -> f32 {
     if x < y { x } else { y }
+}
+
+/// Returns the halves of eight numbers.
+#[inline(always)]
+fn pair(from: &[f32; 8]) -> [&[f32; 4]; 2] {
+    let all = from.as_chunks::<4>().0;
+    [&all[0], &all[1]]
 }
 
 /// Parts an array into four of a quarter of its length.

@@ -4,6 +4,7 @@
 //! apart than others. The rest goes to `narrow`.
 
 pub(crate) mod frame;
+pub(crate) mod line_shear;
 pub(crate) mod line_sides;
 pub(crate) mod local;
 pub(crate) mod math;

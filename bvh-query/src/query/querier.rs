@@ -8,6 +8,7 @@ use crate::leaf::queue::TriangleQueue;
 use crate::query::exact::RecentTriangles;
 use crate::query::pair_search::BoundedPair;
 use crate::query::probe::bounded::BoundedTriangle;
+use crate::query::probe::placed::IntoObject;
 use crate::query::stats::QueryStats;
 use crate::traverse::budget::Budget;
 use crate::traverse::walk_memory::WalkMemory;
@@ -46,6 +47,8 @@ pub struct Querier {
     pub(super) at_end: Ends,
     pub(super) bounded: Vec<BoundedPair>,
     pub(super) bounded_triangles: Vec<BoundedTriangle>,
+    /// The frame of the object that lines in its own frame were last about, by the number of its file and its own.
+    pub(super) own_frame: Option<((u64, usize), IntoObject)>,
     budget: Budget,
     pub(super) stats: QueryStats,
     questions: u64,
@@ -88,6 +91,7 @@ impl Querier {
             at_end: Ends::default(),
             bounded: Vec::new(),
             bounded_triangles: Vec::new(),
+            own_frame: None,
             budget: Budget::new(u64::MAX),
             stats: QueryStats::default(),
             questions: 0,

@@ -213,12 +213,18 @@ impl ProbeSearch<'_> {
     }
 
     /// Asks a question about a line and all instances that it may matter for.
-    fn line(&mut self, question: &mut dyn LineQuestion) -> Result<(), SceneError> {
+    fn line(&mut self, question: &mut impl LineQuestion) -> Result<(), SceneError> {
         let (Line { origin, direction, .. }, until) = (question.line(), question.limit());
+        let inverse = direction.map(|v| 1.0 / v);
         let entry = |bounds: &WorldBox| {
             let magnitude =
                 sum_of_magnitudes(&origin) + sum_of_magnitudes(&bounds.lo) + sum_of_magnitudes(&bounds.hi);
-            match range_in_box(&origin, &direction, &[bounds.lo, bounds.hi], PROBE_ERROR * magnitude) {
+            match range_in_box(
+                &origin,
+                (&direction, &inverse),
+                &[bounds.lo, bounds.hi],
+                PROBE_ERROR * magnitude,
+            ) {
                 Some([near, far]) if far >= 0.0 && near <= until => near.max(0.0),
                 _ => f64::INFINITY,
             }

@@ -27,6 +27,12 @@ impl Budget {
         Self { given: left, left, ..self }
     }
 
+    /// Returns whether nothing limits the question.
+    #[inline(always)]
+    pub(crate) fn is_unlimited(&self) -> bool {
+        self.visits == u64::MAX
+    }
+
     /// Returns the number of visits that are left.
     pub(crate) fn left(&self) -> u64 {
         self.left

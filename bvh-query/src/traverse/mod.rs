@@ -17,6 +17,8 @@ mod per_node;
 pub(crate) mod placement;
 pub(crate) mod point_filter;
 pub(crate) mod probe_walk;
+pub(crate) mod ray_build;
+pub(crate) mod ray_walk;
 pub(crate) mod slab_filter;
 pub(crate) mod slab_memory;
 #[cfg(feature = "trace")]

@@ -3,10 +3,12 @@
 //! Each use of an intrinsic names its [`Proof`]: a value that exists only where the CPU has been found to have the features.
 
 use super::corners::Corners;
+use super::doubles::Doubles;
 use super::{Isa, Lanes, Part, Task, halves, rows_at};
 use bvh_format::slabs::Group;
 use bvh_format::treelet::SHORT_CODES;
 use std::arch::x86_64::*;
+use std::sync::OnceLock;
 
 /// The token of the AVX2 backend.
 #[derive(Clone, Copy)]
@@ -58,14 +60,18 @@ impl Avx2 {
     /// Returns the token if the CPU has AVX2, FMA, F16C, BMI1, BMI2, LZCNT and POPCNT.
     #[inline]
     pub(crate) fn detect() -> Option<Self> {
-        let all = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("fma")
-            && is_x86_feature_detected!("f16c")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        all.then_some(Self(()))
+        static FOUND: OnceLock<Option<Avx2>> = OnceLock::new();
+        // One look at what was found before takes less time than seven.
+        *FOUND.get_or_init(|| {
+            let all = is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("f16c")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("popcnt");
+            all.then_some(Self(()))
+        })
     }
 }
 
@@ -165,6 +171,33 @@ impl D {
     pub(super) fn new(proof: impl Proof, [x, y, z]: [f64; 3]) -> Self {
         Self(with_features!(proof, _mm256_setr_pd(x, y, z, z)))
     }
+
+    /// Makes a register of four numbers.
+    #[inline(always)]
+    pub(super) fn widen(proof: impl Proof, from: &[f32; 4]) -> Self {
+        let four = load_four(proof, from);
+        Self(with_features!(proof, _mm256_cvtps_pd(four)))
+    }
+
+    /// Makes a register of one number.
+    #[inline(always)]
+    pub(super) fn splat(proof: impl Proof, value: f64) -> Self {
+        Self(with_features!(proof, _mm256_set1_pd(value)))
+    }
+}
+
+impl Doubles for D {
+    by_intrinsics! {
+        (0)
+        sub(other) _mm256_sub_pd;
+        mul(other) _mm256_mul_pd;
+        min(other) _mm256_min_pd;
+        max(other) _mm256_max_pd;
+    }
+    #[inline(always)]
+    fn bits_below(self, other: Self) -> u16 {
+        with_features!(self, _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u16)
+    }
 }
 
 impl Corners for D {
@@ -215,11 +248,28 @@ impl Isa for Avx2 {
     type F32x16 = Y;
     type F32x4 = X;
     type F64x3 = D;
+    type F64x4 = D;
     type Rows<'a> = &'a Group;
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> D {
         D::new(self, from)
+    }
+    #[inline(always)]
+    fn widen(self, from: &[f32; 4]) -> D {
+        D::widen(self, from)
+    }
+    #[inline(always)]
+    fn splat_wide(self, value: f64) -> D {
+        D::splat(self, value)
+    }
+    #[inline(always)]
+    fn halves(self, low: &[f32; 8], high: &[f32; 8]) -> Y {
+        Y(load_eight(self, low), load_eight(self, high))
+    }
+    #[inline(always)]
+    fn swap_halves(self, value: Y) -> Y {
+        Y(value.1, value.0)
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Y {

@@ -36,6 +36,7 @@ unsafe impl avx2::Proof for Avx512 {}
 
 loads! {
     load_four([f32; 4]) -> __m128 = _mm_loadu_ps;
+    load_eight([f32; 8]) -> __m256 = _mm256_loadu_ps;
     load_sixteen([f32; 16]) -> __m512 = _mm512_loadu_ps;
     load_sixteen_of_bytes([u8; 64]) -> __m512 = _mm512_loadu_ps;
     load_bytes([u8; 16]) -> __m128i = _mm_loadu_si128;
@@ -156,6 +157,7 @@ impl Isa for Avx512 {
     type F32x16 = Z;
     type F32x4 = X;
     type F64x3 = D;
+    type F64x4 = D;
     /// The lower and upper ends of four sets of slabs: the axes, the cube's diagonals, and two halves of its faces'
     /// diagonals.
     type Rows<'a> = [[Z; 2]; 4];
@@ -163,6 +165,23 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> D {
         D::new(self, from)
+    }
+    #[inline(always)]
+    fn widen(self, from: &[f32; 4]) -> D {
+        D::widen(self, from)
+    }
+    #[inline(always)]
+    fn splat_wide(self, value: f64) -> D {
+        D::splat(self, value)
+    }
+    #[inline(always)]
+    fn halves(self, low: &[f32; 8], high: &[f32; 8]) -> Z {
+        let (low, high) = (load_eight(self, low), load_eight(self, high));
+        Z(with_features!(self, _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high)))
+    }
+    #[inline(always)]
+    fn swap_halves(self, value: Z) -> Z {
+        Z(with_features!(self, _mm512_shuffle_f32x4::<0b01_00_11_10>(value.0, value.0)))
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Z {

@@ -1,6 +1,7 @@
 //! The portable backend: arrays, one element at a time. It defines the results of the other backends.
 
 use super::corners::Three;
+use super::doubles::FourDoubles;
 use super::{Isa, Lanes, Part, Task, rows_at};
 use bvh_format::ordered::from_ordered;
 use bvh_format::quantize::round_step_up;
@@ -93,11 +94,28 @@ impl Isa for Scalar {
     type F32x16 = Array<16>;
     type F32x4 = Array<4>;
     type F64x3 = Three;
+    type F64x4 = FourDoubles;
     type Rows<'a> = &'a Group;
 
     #[inline(always)]
     fn corners(self, from: [f64; 3]) -> Three {
         Three::from(from)
+    }
+    #[inline(always)]
+    fn widen(self, from: &[f32; 4]) -> FourDoubles {
+        FourDoubles(from.map(f64::from))
+    }
+    #[inline(always)]
+    fn splat_wide(self, value: f64) -> FourDoubles {
+        FourDoubles([value; 4])
+    }
+    #[inline(always)]
+    fn halves(self, low: &[f32; 8], high: &[f32; 8]) -> Array<16> {
+        Array(std::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] }))
+    }
+    #[inline(always)]
+    fn swap_halves(self, value: Array<16>) -> Array<16> {
+        Array(std::array::from_fn(|i| value.0[(i + 8) % 16]))
     }
     #[inline(always)]
     fn splat(self, value: f32) -> Array<16> {

@@ -14,12 +14,14 @@ use crate::leaf::point_bounds::LocalPoint;
 use crate::narrow::{Point, Triangle};
 use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::query::exact::{placed, stored};
+use crate::query::probe::line_tree::AskTree;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::sum_of_magnitudes;
 use crate::query::querier::Querier;
 use crate::query::stats::QueryStats;
 use crate::traverse::line_filter::{LineFilter, Segment};
 use crate::traverse::probe_walk::ProbeVisitor;
+use crate::traverse::ray_build::MakeRayTree;
 use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use bvh_format::object::Object;
@@ -60,7 +62,7 @@ pub(crate) trait LineQuestion {
     }
 
     /// Refuses shapes about which the question is not defined.
-    fn admits(&self, _: Shape<'_>) -> Result<(), QueryError> {
+    fn admits(&self, _: &Shape<'_>) -> Result<(), QueryError> {
         Ok(())
     }
 
@@ -99,18 +101,44 @@ impl Candidate<'_> {
     }
 }
 
+/// A question, and what it says of itself before it is asked.
+pub(super) struct Posed<'a> {
+    question: &'a mut dyn LineQuestion,
+    line: Line,
+    limit: f64,
+    is_about_cores: bool,
+}
+
+impl<'a> Posed<'a> {
+    #[inline(always)]
+    fn new<Q: LineQuestion>(question: &'a mut Q) -> Self {
+        let (line, limit) = (question.line(), question.limit());
+        Self { line, limit, is_about_cores: question.is_about_cores(), question }
+    }
+}
+
+/// Questions of one kind, one after another.
+pub(super) trait LineQuestions {
+    fn next(&mut self) -> Option<Posed<'_>>;
+}
+
+impl<Q: LineQuestion> LineQuestions for std::slice::IterMut<'_, Q> {
+    fn next(&mut self) -> Option<Posed<'_>> {
+        Iterator::next(self).map(Posed::new)
+    }
+}
+
 impl Querier {
     /// Asks a question about a line and all objects of a shape.
     pub(crate) fn ask_line(
         &mut self,
         placed: &PlacedShape<'_>,
-        question: &mut dyn LineQuestion,
+        question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
-        question.admits(placed.shape)?;
-        for (index, object) in placed.shape.objects().iter().enumerate() {
+        question.admits(&placed.shape)?;
+        for index in 0..placed.shape.objects().len() {
             self.memory.budget.visit()?;
-            let into = IntoObject::new(placed.pose.as_ref(), object);
-            self.ask_line_of_object(placed, index, &into, question)?;
+            self.ask_line_of_object(placed, index, question)?;
         }
         Ok(())
     }
@@ -120,48 +148,94 @@ impl Querier {
         &mut self,
         placed: &PlacedShape<'_>,
         index: usize,
-        into: &IntoObject,
-        question: &mut dyn LineQuestion,
+        question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
-        let radius = if question.is_about_cores() { 0.0 } else { placed.shape.radius() };
-        if let Some(clipped) = Clipped::new(&question.line(), into, question.limit(), radius) {
-            let memory = &mut self.memory;
-            let (tests, stats) = self.backend.run(AskObject { placed, index, clipped, question, memory })?;
-            self.stats.add(tests, stats);
+        self.ask_lines_of_object(placed, index, &mut std::slice::from_mut(question).iter_mut())
+    }
+
+    /// Starts a query, and asks questions about lines of which each has the whole budget. If one fails, so do all.
+    pub(super) fn ask_lines<Q: LineQuestion>(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        questions: &mut [Q],
+    ) -> Result<(), QueryError> {
+        self.start();
+        if !self.memory.budget.is_unlimited() {
+            return Err(self.memory.budget.error());
+        }
+        questions.first().map_or(Ok(()), |question| question.admits(&placed.shape))?;
+        for index in 0..placed.shape.objects().len() {
+            self.ask_lines_of_object(placed, index, &mut questions.iter_mut())?;
+        }
+        Ok(())
+    }
+
+    /// Asks questions about lines and one object of a shape.
+    fn ask_lines_of_object(
+        &mut self,
+        placed: &PlacedShape<'_>,
+        index: usize,
+        questions: &mut dyn LineQuestions,
+    ) -> Result<(), QueryError> {
+        let (bvh, object) = (placed.shape.bvh(), &placed.shape.objects()[index]);
+        let slot = bvh.ray_slot(placed.shape.first() + index);
+        let (memory, stats) = (&mut self.memory, &mut self.stats);
+        // A budget limits the visits of a walk, which must not depend on what was asked before.
+        let is_unlimited = memory.budget.is_unlimited();
+        let make = || self.backend.run(MakeRayTree { bvh, object }).ok().flatten();
+        let tree = if is_unlimited { slot.tree(object.record().treelets.get(), make) } else { None };
+        if let Some(tree) = tree {
+            let posed_into;
+            let into = if placed.pose.is_none() {
+                let of = (bvh.identity(), placed.shape.first() + index);
+                match &mut self.own_frame {
+                    Some((known, into)) if *known == of => into,
+                    other => &mut other.insert((of, IntoObject::new(None, object))).1,
+                }
+            } else {
+                posed_into = IntoObject::new(placed.pose.as_ref(), object);
+                &posed_into
+            };
+            return self.backend.run(AskTree { tree, placed, index, into, questions, memory, stats });
+        }
+        while let Some(posed) = questions.next() {
+            slot.spend(self.backend.run(AskObject { placed, index, posed, memory, stats })?);
         }
         Ok(())
     }
 }
 
 /// What is left of a line in the box of an object.
-struct Clipped {
-    segment: Segment,
-    /// The direction of the line, which the segment may be too short to tell.
-    direction: Point,
-    /// The inverse of the largest side of the box, a power of two.
-    scale: f64,
+pub(super) struct Clipped {
+    pub(super) segment: Segment,
+    /// The direction of the line, which the segment may be too short to tell, and the inverses of its components.
+    pub(super) direction: Point,
+    pub(super) inverse: Point,
     /// The parameter at which the segment starts, and how much of it the segment is long.
     start: f64,
     length: f64,
+    /// The inverse of that.
+    pub(super) inverse_length: f64,
+    /// More than the share of the whole segment.
+    pub(super) whole: f32,
     /// How far around its triangles the shape reaches.
-    radius: f64,
+    pub(super) radius: f64,
 }
 
 impl Clipped {
     #[inline(always)]
-    fn new(line: &Line, into: &IntoObject, limit: f64, radius: f64) -> Option<Self> {
+    pub(super) fn new(line: &Line, into: &IntoObject, limit: f64, radius: f64) -> Option<Self> {
         let (origin, direction) = (into.point(line.origin), into.direction(line.direction));
         // A point of the line in the box is at most twice as far along it as the magnitudes of both add up to.
         let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin) + radius));
         // A pose may stretch: see `closest`.
         let error = error + radius * MAX_STRETCH;
-        let [start, end] = range_in_box(&origin, &direction, &into.bounds, error)?;
+        let inverse = direction.map(|v| 1.0 / v);
+        let [start, end] = range_in_box(&origin, (&direction, &inverse), &into.bounds, error)?;
         let (start, end) = (start.max(0.0), end.min(limit));
         if start > end {
             return None;
         }
-        let [lo, hi] = &into.bounds;
-        let size = (hi[0] - lo[0]).max(hi[1] - lo[1]).max(hi[2] - lo[2]);
         let length = end - start;
         Some(Self {
             segment: Segment {
@@ -170,23 +244,58 @@ impl Clipped {
                 error: 2.0 * error,
             },
             direction,
-            scale: scale_of(size),
+            inverse,
             start,
             length,
+            inverse_length: 1.0 / length,
+            // Entries may exceed 1 by rounding.
+            whole: 2.0,
+            radius,
+        })
+    }
+
+    /// Takes a line as it is, with its own parameter for the share of a segment, if it starts near the object, and its numbers and
+    /// those of the object are far from the limits of `f32`; else clips it. Nothing waits for the ends of what would be left of it.
+    #[inline(always)]
+    pub(super) fn whole_or_clipped(line: &Line, into: &IntoObject, limit: f64, radius: f64) -> Option<Self> {
+        /// So much farther away than the object is large, no digits are missed.
+        const MAX_SIZES: f64 = 16.0;
+        let are_usual = |x: f64| (USUAL..1.0 / USUAL).contains(&x);
+        let (origin, direction) = (into.point(line.origin), into.direction(line.direction));
+        let largest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+        let far = farthest(&origin, &into.bounds);
+        if !(are_usual(into.size) && are_usual(largest) && far + radius <= MAX_SIZES * into.size) {
+            return Self::new(line, into, limit, radius);
+        }
+        // As in `new`.
+        let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin) + radius));
+        let error = error + radius * MAX_STRETCH;
+        let inverse = direction.map(|v| 1.0 / v);
+        let [start, end] = range_in_box(&origin, (&direction, &inverse), &into.bounds, error)?;
+        if end < 0.0 || start > limit {
+            return None;
+        }
+        Some(Self {
+            segment: Segment { start: origin, vector: direction, error: 2.0 * error },
+            direction,
+            inverse,
+            start: 0.0,
+            length: f64::INFINITY,
+            inverse_length: 1.0,
+            whole: f32::INFINITY,
             radius,
         })
     }
 
     /// Returns the share of the segment up to a limit of the parameter; negative if that is before its start.
     #[inline(always)]
-    fn share(&self, limit: f64) -> f32 {
+    pub(super) fn share(&self, limit: f64) -> f32 {
         if limit < self.start {
             -1.0
         } else if limit - self.start < self.length {
-            round_up((limit - self.start) / self.length * (1.0 + SLACK))
+            round_up((limit - self.start) * self.inverse_length * (1.0 + SLACK))
         } else {
-            // Entries may exceed 1 by rounding.
-            2.0
+            self.whole
         }
     }
 
@@ -203,11 +312,22 @@ impl Clipped {
     }
 }
 
-/// Returns the range of parameters for which a line may be in a box; nothing if it misses the box by more than an error.
+/// 2^-32: the least number that [`Clipped::whole_or_clipped`] takes as it is.
+const USUAL: f64 = 1.0 / (1u64 << 32) as f64;
+
+/// Returns how far the corners of a box are from a point along any axis.
+#[inline(always)]
+pub(super) fn farthest(from: &Point, [lo, hi]: &[Point; 2]) -> f64 {
+    let far = |axis: usize| (from[axis] - lo[axis]).abs().max((hi[axis] - from[axis]).abs());
+    far(0).max(far(1)).max(far(2))
+}
+
+/// Returns the range of parameters for which a line may be in a box; nothing if it misses the box by more than an error. The line has
+/// a direction and the inverses of its components.
 #[inline(always)]
 pub(crate) fn range_in_box(
     origin: &Point,
-    direction: &Point,
+    (direction, inverse): (&Point, &Point),
     [lo, hi]: &[Point; 2],
     error: f64,
 ) -> Option<[f64; 2]> {
@@ -220,7 +340,7 @@ pub(crate) fn range_in_box(
             }
             continue;
         }
-        let (x, y) = (below / direction[k], above / direction[k]);
+        let (x, y) = (below * inverse[k], above * inverse[k]);
         near = near.max(x.min(y));
         far = far.min(x.max(y));
     }
@@ -232,60 +352,92 @@ pub(crate) fn range_in_box(
 struct AskObject<'a> {
     placed: &'a PlacedShape<'a>,
     index: usize,
-    clipped: Clipped,
-    question: &'a mut dyn LineQuestion,
+    posed: Posed<'a>,
     memory: &'a mut WalkMemory,
+    stats: &'a mut QueryStats,
 }
 
 impl Task for AskObject<'_> {
-    /// The number of node tests, and what else was done.
-    type Output = Result<(u64, QueryStats), QueryError>;
+    /// The number of node tests.
+    type Output = Result<u64, QueryError>;
 
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) -> Self::Output {
-        let Self { placed, index, clipped, question, memory } = self;
+        let Self { placed, index, posed, memory, stats } = self;
         let (bvh, object) = (placed.shape.bvh(), &placed.shape.objects()[index]);
+        let into = IntoObject::new(placed.pose.as_ref(), object);
+        let Some(of) = Asked::new(placed, index, (&into, false), posed, stats) else { return Ok(0) };
         let mut visitor = Walked {
-            bvh,
-            object,
-            placed,
-            number: (placed.shape.first() + index) as u32,
-            test: LineFilter::new(isa, &clipped.segment, object.profile().directions()),
-            direction: direction(&clipped.direction),
-            limit: clipped.share(question.limit()),
-            clipped,
+            test: LineFilter::new(isa, &of.clipped.segment, object.profile().directions()),
+            direction: direction(&of.clipped.direction),
+            scale: scale_of(into.size) as f32,
             rooms: [Packet::NONE; 4],
-            question,
-            stats: QueryStats::default(),
+            of,
         };
         let tests = isa.run(memory.probe_walk(bvh, object, &mut visitor))?;
-        Ok((tests, visitor.stats))
+        visitor.of.stats.node_tests += tests;
+        Ok(tests)
     }
 }
 
-/// Hands the triangles of an object that a line may meet to a question.
-struct Walked<'a> {
+/// A question about an object, and what is left of its line.
+pub(super) struct Asked<'a> {
     question: &'a mut dyn LineQuestion,
-    bvh: &'a Bvh,
-    object: &'a Object,
+    pub(super) bvh: &'a Bvh,
+    pub(super) object: &'a Object,
     placed: &'a PlacedShape<'a>,
     number: u32,
-    test: LineFilter,
-    direction: [f32; 3],
-    clipped: Clipped,
+    pub(super) clipped: Clipped,
     /// The share of the segment that is left.
-    limit: f32,
-    /// Room for packets that are encoded.
-    rooms: [Packet; 4],
-    stats: QueryStats,
+    pub(super) limit: f32,
+    pub(super) stats: &'a mut QueryStats,
 }
 
-impl Walked<'_> {
+impl<'a> Asked<'a> {
+    /// Clips the line, or takes it as it is where that `may_be_whole`. Returns nothing if it misses the box of the object.
+    #[inline(always)]
+    pub(super) fn new(
+        placed: &'a PlacedShape<'a>,
+        index: usize,
+        (into, may_be_whole): (&IntoObject, bool),
+        posed: Posed<'a>,
+        stats: &'a mut QueryStats,
+    ) -> Option<Self> {
+        let Posed { question, line, limit, is_about_cores } = posed;
+        let radius = if is_about_cores { 0.0 } else { placed.shape.radius() };
+        let clipped = if may_be_whole {
+            Clipped::whole_or_clipped(&line, into, limit, radius)?
+        } else {
+            Clipped::new(&line, into, limit, radius)?
+        };
+        Some(Self {
+            bvh: placed.shape.bvh(),
+            object: &placed.shape.objects()[index],
+            placed,
+            number: (placed.shape.first() + index) as u32,
+            limit: clipped.share(limit),
+            clipped,
+            question,
+            stats,
+        })
+    }
+
     /// Lets the question decide about a triangle.
     fn decide(&mut self, leaf: LeafPacket, lane: u8) -> Result<(), QueryError> {
+        let triangle = stored(self.bvh, self.object, leaf, lane)?;
+        self.decide_about(triangle, leaf, lane)
+    }
+
+    /// Lets the question decide about a triangle in the frame of its file.
+    #[inline(always)]
+    pub(super) fn decide_about(
+        &mut self,
+        mut triangle: Triangle,
+        leaf: LeafPacket,
+        lane: u8,
+    ) -> Result<(), QueryError> {
         self.stats.exact_tests += 1;
         let Self { bvh, object, .. } = *self;
-        let mut triangle = stored(bvh, object, leaf, lane)?;
         if let Some(pose) = &self.placed.pose {
             triangle = placed(&triangle, pose);
         }
@@ -297,6 +449,17 @@ impl Walked<'_> {
     }
 }
 
+/// Hands the triangles of an object that a line may meet to a question.
+struct Walked<'a> {
+    of: Asked<'a>,
+    test: LineFilter,
+    direction: [f32; 3],
+    /// The inverse of the largest side of the box, a power of two.
+    scale: f32,
+    /// Room for packets that are encoded.
+    rooms: [Packet; 4],
+}
+
 impl ProbeVisitor for Walked<'_> {
     #[inline(always)]
     fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::F32x4 {
@@ -305,24 +468,24 @@ impl ProbeVisitor for Walked<'_> {
 
     #[inline(always)]
     fn limit(&self) -> f32 {
-        self.limit
+        self.of.limit
     }
 
     #[inline(always)]
     fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
-        self.stats.packet_tests += leaves.len() as u64;
-        let (packets, valid) = self.bvh.packets(isa, self.object, leaves, &mut self.rooms)?;
+        let Self { of, direction, scale, rooms, .. } = self;
+        of.stats.packet_tests += leaves.len() as u64;
+        let (packets, valid) = of.bvh.packets(isa, of.object, leaves, rooms)?;
         let corner = &packets[0].corners[0];
-        let near = self.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
-        let point = LocalPoint::new(&near, self.clipped.segment.error, self.clipped.scale as f32);
+        let near = of.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
+        let point = LocalPoint::new(&near, of.clipped.segment.error, *scale);
         // A line may pass a rounded triangle on any side.
-        let is_rounded = self.clipped.radius > 0.0;
-        let mut left =
-            if is_rounded { valid } else { valid & crossed(isa, packets, &point, &self.direction) };
-        while left != 0 && self.limit >= 0.0 {
+        let is_rounded = of.clipped.radius > 0.0;
+        let mut left = if is_rounded { valid } else { valid & crossed(isa, packets, &point, direction) };
+        while left != 0 && of.limit >= 0.0 {
             let at = left.trailing_zeros() as usize & 15;
             left &= left - 1;
-            self.decide(leaves[at / 4], (at & 3) as u8)?;
+            of.decide(leaves[at / 4], (at & 3) as u8)?;
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 pub(in crate::query) mod bounded;
 pub(crate) mod closest;
 pub(crate) mod line;
+mod line_tree;
 pub(in crate::query) mod near;
 pub(crate) mod placed;
 pub(crate) mod point;

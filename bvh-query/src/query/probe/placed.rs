@@ -60,6 +60,8 @@ pub(crate) struct IntoObject {
     origin: [f64; 3],
     /// The object's box around its origin.
     pub(crate) bounds: [[f64; 3]; 2],
+    /// The largest side of the box.
+    pub(crate) size: f64,
     /// The sum of the magnitudes of all that.
     magnitude: f64,
     /// How far vertices are from their offsets.
@@ -67,14 +69,17 @@ pub(crate) struct IntoObject {
 }
 
 impl IntoObject {
+    #[inline(always)]
     pub(crate) fn new(pose: Option<&Pose>, object: &Object) -> Self {
         let (record, origin) = (object.record(), object.origin());
         let bounds = [record.box_lo, record.box_hi].map(|corner| corner.map(|v| f64::from(v.get())));
         let translation = pose.map_or([0.0; 3], |pose| pose.translation());
         let magnitude =
             [origin, bounds[0], bounds[1], translation].as_flattened().iter().map(|v| v.abs()).sum();
+        let side = |k: usize| bounds[1][k] - bounds[0][k];
+        let size = side(0).max(side(1)).max(side(2));
         let (rotation, left_out) = (pose.map(|pose| inverse(pose.rotation())), object.volumes().left_out);
-        Self { rotation, translation, origin, bounds, magnitude, left_out }
+        Self { rotation, translation, origin, bounds, size, magnitude, left_out }
     }
 
     /// Returns where a point is.

@@ -8,15 +8,21 @@ use crate::isa::{Backend, BackendError};
 use crate::query::pool::Pool;
 use crate::query::probe::closest::ClosestPoint;
 use crate::query::probe::closest::check_within;
+use crate::query::probe::line::LineQuestion;
 use crate::query::probe::placed::PlacedShape;
-use crate::query::probe::ray::Ray;
-use crate::query::probe::ray::RayHit;
+use crate::query::probe::point::check_point;
+use crate::query::probe::ray::{All, Any, First, Ray, RayHit, Scaled};
+use crate::query::probe::segment::MeetsSegment;
 use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
 use std::convert::Infallible;
 
 /// Probes in a run of one thread.
 const PROBES_PER_RUN: usize = 256;
+/// Lines that are asked about together: their questions stay in the nearest cache.
+const LINES_AT_ONCE: usize = 32;
+/// Lines are sorted where a file does not stay in the caches nearest to a processor.
+const MIN_SORTED_BYTES: usize = 16 << 20;
 
 /// Asks about many points, rays or segments and one mesh, on all threads of the rayon pool it is called in.
 ///
@@ -94,7 +100,13 @@ impl<'a> ProbeBatch<'a> {
     /// # Errors
     /// The error of the first ray that fails.
     pub fn first_hits(&self, rays: &[Ray]) -> Result<Vec<Option<RayHit>>, QueryError> {
-        self.each(rays, |ray| ray.origin, |querier, ray| querier.first_hit(self.shape, ray))
+        self.each_line(
+            rays,
+            |ray| ray.origin,
+            Scaled::new,
+            First::about,
+            |first| first.hit().map(|(_, hit)| hit),
+        )
     }
 
     /// Answers [`Querier::any_hit`] for each ray.
@@ -102,7 +114,7 @@ impl<'a> ProbeBatch<'a> {
     /// # Errors
     /// The error of the first ray that fails.
     pub fn any_hits(&self, rays: &[Ray]) -> Result<Vec<bool>, QueryError> {
-        self.each(rays, |ray| ray.origin, |querier, ray| querier.any_hit(self.shape, ray))
+        self.each_line(rays, |ray| ray.origin, Scaled::new, Any::about, |any| any.found)
     }
 
     /// Answers [`Querier::all_hits`] for each ray.
@@ -110,7 +122,13 @@ impl<'a> ProbeBatch<'a> {
     /// # Errors
     /// The error of the first ray that fails.
     pub fn all_hits(&self, rays: &[Ray]) -> Result<Vec<Vec<RayHit>>, QueryError> {
-        self.each(rays, |ray| ray.origin, |querier, ray| querier.all_hits(self.shape, ray))
+        self.each_line(
+            rays,
+            |ray| ray.origin,
+            Scaled::new,
+            All::about,
+            |all| all.hits().map(|(_, hit)| hit).collect(),
+        )
     }
 
     /// Answers [`Querier::segment_hit`] for each segment, given by its ends.
@@ -119,7 +137,13 @@ impl<'a> ProbeBatch<'a> {
     /// The error of the first segment that fails.
     pub fn segment_hits(&self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, QueryError> {
         let middle = |[p, q]: &[[f64; 3]; 2]| [0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0);
-        self.each(segments, middle, |querier, [from, to]| querier.segment_hit(self.shape, *from, *to))
+        self.each_line(
+            segments,
+            middle,
+            |[from, to]| Ok([check_point(from)?, check_point(to)?]),
+            MeetsSegment::about,
+            |segment| segment.met,
+        )
     }
 
     /// Asks about each probe, in the order of their places along the curve.
@@ -130,25 +154,124 @@ impl<'a> ProbeBatch<'a> {
         ask: impl Fn(&mut Querier, &P) -> Result<R, QueryError> + Sync,
     ) -> Result<Vec<R>, QueryError> {
         let order = along_curve(&probes.iter().map(at).collect::<Vec<_>>());
-        let mut answers: Vec<Option<Result<R, QueryError>>> = probes.iter().map(|_| None).collect();
-        let mut numbers = order.iter();
+        self.runs(Some(&order), probes.len(), |querier, numbers, run| {
+            for number in numbers {
+                run.add(number, ask(querier, &probes[number]));
+            }
+        })
+    }
+
+    /// Asks a question about each line, some at a time. `read` checks a line, `about` makes a question of it, and `answer` answers it.
+    fn each_line<P: Sync, S, Q: LineQuestion, R: Send>(
+        &self,
+        lines: &[P],
+        at: impl Fn(&P) -> [f64; 3],
+        read: impl Fn(&P) -> Result<S, QueryError> + Sync,
+        about: impl Fn(S) -> Q + Sync,
+        answer: impl Fn(&mut Q) -> R + Sync,
+    ) -> Result<Vec<R>, QueryError> {
+        let is_large = self.shape.shape.bvh().bytes().len() >= MIN_SORTED_BYTES;
+        let order = is_large.then(|| along_curve(&lines.iter().map(at).collect::<Vec<_>>()));
+        self.runs(order.as_deref(), lines.len(), |querier, numbers, run| {
+            let mut questions = Vec::with_capacity(LINES_AT_ONCE);
+            loop {
+                let (mut of, mut count, mut are_read) = ([0; LINES_AT_ONCE], 0, true);
+                questions.clear();
+                for number in (&mut *numbers).take(LINES_AT_ONCE) {
+                    (of[count], count) = (number, count + 1);
+                    match read(&lines[number]) {
+                        Ok(line) => questions.push(about(line)),
+                        Err(_) => are_read = false,
+                    }
+                }
+                if count == 0 {
+                    break;
+                }
+                if are_read && querier.ask_lines(&self.shape, &mut questions).is_ok() {
+                    for (question, number) in questions.iter_mut().zip(of) {
+                        run.add(number, Ok(answer(question)));
+                    }
+                    continue;
+                }
+                // One of them has an error.
+                for &number in &of[..count] {
+                    run.add(
+                        number,
+                        read(&lines[number]).and_then(|line| {
+                            let mut question = about(line);
+                            querier.start();
+                            querier.ask_line(&self.shape, &mut question)?;
+                            Ok(answer(&mut question))
+                        }),
+                    );
+                }
+            }
+        })
+    }
+
+    /// Calls `ask` with runs of numbers of probes, in an order, and returns the answers in the order of the probes.
+    fn runs<R: Send>(
+        &self,
+        order: Option<&[u32]>,
+        count: usize,
+        ask: impl Fn(&mut Querier, &mut dyn Iterator<Item = usize>, &mut Run<R>) + Sync,
+    ) -> Result<Vec<R>, QueryError> {
+        let number = |place: usize| order.map_or(place, |order| order[place] as usize);
+        let mut answers: Vec<Option<R>> = Vec::new();
+        if order.is_some() {
+            answers.resize_with(count, || None);
+        }
+        let (mut place, mut failed) = (0, None::<(usize, QueryError)>);
         // An error ends no run, because a probe that comes later along the curve may be the first that fails.
         let Ok(()) = self.pool.runs(
             rayon::current_num_threads(),
-            order.len(),
+            count,
             PROBES_PER_RUN,
             |querier, places| {
-                let of_run = places.map(|place| ask(querier, &probes[order[place] as usize]));
-                Ok::<_, (usize, Infallible)>(of_run.collect::<Vec<_>>())
+                let answers = Vec::with_capacity(PROBES_PER_RUN.min(count));
+                let mut run = Run { answers, failed: None };
+                ask(querier, &mut places.map(number), &mut run);
+                Ok::<_, (usize, Infallible)>(run)
             },
-            |of_run| {
-                // The answers first, so that the end of a run takes no number of the next one.
-                for (answer, &number) in of_run.into_iter().zip(numbers.by_ref()) {
-                    answers[number as usize] = Some(answer);
+            |mut run| {
+                if order.is_none() {
+                    answers.append(&mut run.answers);
                 }
+                for answer in run.answers {
+                    answers[number(place)] = answer;
+                    place += 1;
+                }
+                failed = failed.take().into_iter().chain(run.failed).min_by_key(|(number, _)| *number);
             },
         );
-        answers.into_iter().flatten().collect()
+        if let Some((_, error)) = failed {
+            return Err(error);
+        }
+        let all = answers.into_iter();
+        Ok(all.map(|answer| answer.unwrap_or_else(|| unreachable!("each probe has an answer"))).collect())
+    }
+}
+
+/// The answers of a run.
+struct Run<R> {
+    /// None for a probe that failed.
+    answers: Vec<Option<R>>,
+    /// The first probe that failed.
+    failed: Option<(usize, QueryError)>,
+}
+
+impl<R> Run<R> {
+    #[inline(always)]
+    fn add(&mut self, number: usize, answer: Result<R, QueryError>) {
+        match answer {
+            Ok(answer) => self.answers.push(Some(answer)),
+            Err(error) => {
+                if self.failed.as_ref().is_none_or(|&(first, _)| number < first) {
+                    self.failed = Some((number, error));
+                }
+                self.answers.push(None);
+            }
+        }
     }
 }
 
@@ -162,6 +285,9 @@ fn along_curve(points: &[[f64; 3]]) -> Vec<u32> {
         }
     }
     let widest = (0..3).map(|axis| hi[axis] - lo[axis]).fold(0.0, f64::max);
+    if widest == 0.0 {
+        return (0..points.len() as u32).collect();
+    }
     let cells = 65535.0 / widest;
     let code = |point: &[f64; 3]| {
         // A point that is no point counts as 0.

@@ -122,7 +122,7 @@ const LEAST_COMPONENT: f64 = f64::from_bits((1023 - 200) << 52);
 
 /// A ray whose direction has a power of two as its unit, so that its largest component is in [1, 2).
 #[derive(Clone, Copy)]
-struct Scaled {
+pub(super) struct Scaled {
     ray: narrow::Ray,
     /// What parameters of this ray are multiplied by to be those of the ray that was given, a power of two.
     unit: f64,
@@ -130,7 +130,8 @@ struct Scaled {
 }
 
 impl Scaled {
-    fn new(ray: &Ray) -> Result<Self, QueryError> {
+    #[inline(always)]
+    pub(super) fn new(ray: &Ray) -> Result<Self, QueryError> {
         let origin = check_point(&ray.origin)?;
         let largest =
             ray.direction.iter().fold(0.0f64, |most, v| if v.abs() <= most { most } else { v.abs() });
@@ -212,8 +213,14 @@ pub(crate) struct First {
 }
 
 impl First {
+    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Result<Self, QueryError> {
-        Ok(Self { ray: Scaled::new(ray)?, best: None, best_rounded: None })
+        Ok(Self::about(Scaled::new(ray)?))
+    }
+
+    #[inline(always)]
+    pub(super) fn about(ray: Scaled) -> Self {
+        Self { ray, best: None, best_rounded: None }
     }
 
     /// Returns the first hit, and the number of its instance.
@@ -280,8 +287,14 @@ pub(crate) struct Any {
 }
 
 impl Any {
+    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Result<Self, QueryError> {
-        Ok(Self { ray: Scaled::new(ray)?, found: false })
+        Ok(Self::about(Scaled::new(ray)?))
+    }
+
+    #[inline(always)]
+    pub(super) fn about(ray: Scaled) -> Self {
+        Self { ray, found: false }
     }
 }
 
@@ -308,16 +321,22 @@ pub(crate) struct All {
 }
 
 impl All {
+    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Result<Self, QueryError> {
-        Ok(Self { ray: Scaled::new(ray)?, met: Vec::new() })
+        Ok(Self::about(Scaled::new(ray)?))
+    }
+
+    #[inline(always)]
+    pub(super) fn about(ray: Scaled) -> Self {
+        Self { ray, met: Vec::new() }
     }
 
     /// Returns the hits in the order along the ray, with the numbers of their instances.
-    pub(crate) fn hits(mut self) -> impl Iterator<Item = (u32, RayHit)> {
-        let ray = self.ray;
-        self.met.sort_unstable_by(|x, y| x.compare(&ray, y).then(x.numbers.cmp(&y.numbers)));
-        self.met.dedup_by(|later, earlier| later.compare(&ray, earlier).is_eq());
-        self.met.into_iter().map(move |met| ray.hit(&met))
+    pub(crate) fn hits(&mut self) -> impl ExactSizeIterator<Item = (u32, RayHit)> {
+        let Self { ray, met } = self;
+        met.sort_unstable_by(|x, y| x.compare(ray, y).then(x.numbers.cmp(&y.numbers)));
+        met.dedup_by(|later, earlier| later.compare(ray, earlier).is_eq());
+        met.iter().map(|met| ray.hit(met))
     }
 }
 
@@ -326,7 +345,7 @@ impl LineQuestion for All {
         self.ray.line()
     }
 
-    fn admits(&self, shape: Shape<'_>) -> Result<(), QueryError> {
+    fn admits(&self, shape: &Shape<'_>) -> Result<(), QueryError> {
         if shape.radius() > 0.0 { Err(QueryError::Rounded) } else { Ok(()) }
     }
 

@@ -37,8 +37,14 @@ pub(crate) struct MeetsSegment {
 }
 
 impl MeetsSegment {
+    #[inline(always)]
     pub(crate) fn new(from: Point, to: Point) -> Result<Self, QueryError> {
-        Ok(Self { ends: [check_point(&from)?, check_point(&to)?], met: false })
+        Ok(Self::about([check_point(&from)?, check_point(&to)?]))
+    }
+
+    #[inline(always)]
+    pub(super) fn about(ends: [Point; 2]) -> Self {
+        Self { ends, met: false }
     }
 }
 

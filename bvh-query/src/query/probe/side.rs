@@ -175,7 +175,7 @@ impl Querier {
             undefined |= !topology.closed && open == OpenObject::Undefined;
             let Some(ray) = short_way_out(point, &into) else { continue };
             let mut question = Winding { ray, beside: None, topology, is_on: false, winding: 0 };
-            self.ask_line_of_object(placed, index, &into, &mut question)?;
+            self.ask_line_of_object(placed, index, &mut question)?;
             if question.is_on {
                 return Ok(Side::On);
             }
@@ -208,7 +208,7 @@ impl Querier {
             let topology = placed.shape.bvh().topology(placed.shape.first() + index)?;
             let ray = AxisRay { origin: *point, axis: 0, ascends: true };
             let mut question = Winding { ray, beside: Some(sign), topology, is_on: false, winding: 0 };
-            self.ask_line_of_object(placed, index, &into, &mut question)?;
+            self.ask_line_of_object(placed, index, &mut question)?;
             winding += question.winding;
         }
         Ok(winding)

@@ -6,6 +6,7 @@ mod hard;
 mod labels;
 mod points;
 mod rationals;
+mod ray_tree;
 mod rays;
 mod relations;
 mod sides;

@@ -138,7 +138,8 @@ fn check_pair((a, b): (&Bvh, &Bvh), pose: &Pose, path: &Motion) {
         || ask(&mut fresh(budget)),
     ) {
         Ok(answer) => {
-            assert_eq!(Ok(answer), free(&mut fresh(u64::MAX)), "{name}, budget {budget}");
+            // Nearly without: rays that nothing limits have a tree with boxes of its own, and forged files have wrong ones.
+            assert_eq!(Ok(answer), free(&mut fresh(u64::MAX - 1)), "{name}, budget {budget}");
             answered += 1;
         }
         Err(_) => spent += 1,
@@ -153,7 +154,7 @@ fn check_pair((a, b): (&Bvh, &Bvh), pose: &Pose, path: &Motion) {
             });
         });
         each_probe_question(a, budget, |name, ask| {
-            each_probe_question(a, u64::MAX, |other, free| {
+            each_probe_question(a, u64::MAX - 1, |other, free| {
                 if other == name {
                     compare(name, budget, ask, free);
                 }

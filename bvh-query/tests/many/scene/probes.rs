@@ -126,6 +126,8 @@ fn instances_that_moved_cost_no_more() {
     let at = |x: usize| Pose::new(*Pose::IDENTITY.rotation(), [3.0 * x as f64, 0.0, 0.0]).unwrap();
     let ids: Vec<InstanceId> = (0..40).map(|x| scene.add(ball.clone(), at(x)).unwrap()).collect();
     let ray = Ray::new([-5.0, 0.1, 0.2], [1.0, 0.0, 0.0]);
+    // Often enough for rays to have their tree.
+    scene.all_hits(&[ray; 100]).unwrap();
     let expected = (scene.all_hits(&[ray]).unwrap(), scene.stats());
     assert_eq!(expected.0[0].len(), 80);
     ids.iter().step_by(2).zip((0..).step_by(2)).for_each(|(id, x)| scene.set_pose(*id, at(x)).unwrap());
