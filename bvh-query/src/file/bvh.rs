@@ -29,7 +29,8 @@ use std::sync::{Arc, Mutex, OnceLock, Weak};
 ///
 /// Opening a file reads only its head and its object table, whatever the size of the file. A page is checked when a
 /// query first touches it. An open file needs one byte of memory per page, twice the bytes of the object table, and
-/// some KiB, whatever numbers the file holds.
+/// some KiB, whatever numbers the file holds. Once rays and segments have visited as many nodes of an object as it has, the file
+/// keeps a tree of boxes for them, of up to 16 bytes per triangle. Making it reads the whole object.
 #[derive(Clone, Debug)]
 pub struct Bvh(Arc<OpenFile>);
 

@@ -4,7 +4,7 @@
 //! generic over the token and `#[inline(always)]`. They are inlined into tasks, each of which is a separate function
 //! with the features of the backend enabled. A walk consists of a few tasks: in a single function of 64 KB, compilers
 //! allocate registers badly. A register has 16 lanes (`V`: four children of A against four of B), 4 lanes (`H`: four
-//! children or triangles of one side), or 3 numbers in `f64` (`C`: the corners of a triangle).
+//! children or triangles of one side), or 3 or 4 numbers in `f64` (`C`: the corners of a triangle, or four triangles).
 //!
 //! Decoding gives the same bits on every backend, because it uses exact products only, and so do operations on corners,
 //! which are not fused. Other operations may round differently (`mul_add` is fused where the CPU supports it), so their

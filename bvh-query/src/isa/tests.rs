@@ -2,6 +2,7 @@
 //! way, find the same least and nearest lane, and compute the same of three corners.
 
 use super::corners::Corners;
+use super::doubles::Doubles;
 use super::{Backend, Isa, Lanes, Task};
 use crate::file::unpack::unpack;
 use crate::traverse::decode::{Coding, Parent, decode_group};
@@ -334,6 +335,57 @@ fn every_backend_compares_as_the_portable_one_does() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// Puts halves together, swaps them, and computes with four wide numbers.
+struct HalvesAndDoubles<'a>(&'a [f32; 16], &'a [f32; 4]);
+
+impl Task for HalvesAndDoubles<'_> {
+    type Output = ([f32; 16], [f32; 16], [u16; 6]);
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Self::Output {
+        let Self(numbers, four) = self;
+        let [low, high] = [0, 8].map(|first| std::array::from_fn(|lane| numbers[first + lane]));
+        let (mut joined, mut swapped) = ([0.0; 16], [0.0; 16]);
+        let value = isa.halves(&low, &high);
+        isa.store(value, &mut joined);
+        isa.store(isa.swap_halves(value), &mut swapped);
+        let first: [f32; 4] = std::array::from_fn(|lane| numbers[lane]);
+        let (x, y, one) = (isa.widen(&first), isa.widen(four), isa.splat_wide(1.0));
+        let bits = [
+            x.bits_below(y),
+            x.sub(y).bits_below(one),
+            x.mul(y).bits_below(one),
+            x.min(y).bits_below(one),
+            x.max(y).bits_below(one),
+            one.bits_below(x.mul(x).sub(y.mul(y))),
+        ];
+        (joined, swapped, bits)
+    }
+}
+
+#[test]
+fn every_backend_joins_halves_and_compares_doubles_alike() {
+    let mut random = Random::new(12);
+    for round in 0..2000 {
+        let special = [f32::NAN, f32::INFINITY, 0.0, -0.0, f32::MAX, f32::from_bits(1), 1.0, -1.0];
+        let mut number = || {
+            let bits = random.bits();
+            if bits & 3 == 0 { special[(bits >> 8 & 7) as usize] } else { (bits >> 40) as f32 / 4e6 - 2.0 }
+        };
+        let numbers: [f32; 16] = std::array::from_fn(|_| number());
+        let four: [f32; 4] = std::array::from_fn(|_| number());
+        let bits = |(joined, swapped, of): ([f32; 16], [f32; 16], [u16; 6])| {
+            (joined.map(f32::to_bits), swapped.map(f32::to_bits), of)
+        };
+        let expected = bits(Backend::Scalar.run(HalvesAndDoubles(&numbers, &four)));
+        assert_eq!(expected.0, numbers.map(f32::to_bits));
+        for backend in Backend::ALL.into_iter().filter(|backend| backend.is_available()) {
+            let found = bits(backend.run(HalvesAndDoubles(&numbers, &four)));
+            assert_eq!(found, expected, "{backend}, round {round}");
         }
     }
 }

@@ -202,7 +202,7 @@ impl Task for Open<'_, '_> {
         maker.left = maker.left.checked_sub(1).ok_or_else(|| too_many(bvh, object, max_nodes(object)))?;
         let mut groups = [Group::ZERO; 2];
         let child = ClosedChild {
-            group: &parent.groups[place / 4 & 1],
+            group: &parent.groups[(place / 4) & 1],
             column: place % 4,
             links: &parent.links,
             place,

@@ -1,31 +1,20 @@
-//! The walk of a line: finds the triangles that a ray or a segment may meet, nearest first.
+//! Questions about lines, and what is left of a line near an object.
 //!
-//! The line is first clipped to the box of an object, in f64. This leaves a segment as long as the object, against
-//! which nodes and packets are tested in f32. The remaining triangles go to a question, which decides exactly.
+//! A line is clipped to the box of an object, in f64. This leaves a segment as long as the object, against which nodes and packets are
+//! tested: see [`super::line_walks`]. A line that starts near the object serves as it is.
 
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
 use crate::file::shape::Shape;
-use crate::isa::{Isa, Task};
-use crate::leaf::frame::scale_of;
-use crate::leaf::line_sides::{crossed, direction};
-use crate::leaf::point_bounds::LocalPoint;
 use crate::narrow::{Point, Triangle};
 use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::query::exact::{placed, stored};
-use crate::query::probe::line_tree::AskTree;
 use crate::query::probe::placed::{IntoObject, PlacedShape};
 use crate::query::probe::point::sum_of_magnitudes;
-use crate::query::querier::Querier;
 use crate::query::stats::QueryStats;
-use crate::traverse::line_filter::{LineFilter, Segment};
-use crate::traverse::probe_walk::ProbeVisitor;
-use crate::traverse::ray_build::MakeRayTree;
-use crate::traverse::walk_memory::WalkMemory;
-use bvh_format::leaf::Packet;
+use crate::traverse::line_filter::Segment;
 use bvh_format::object::Object;
-use bvh_format::slabs::Group;
 
 /// A part of a line in the frame of a question: its points are `origin + t * direction` with t from 0 to a limit.
 #[derive(Clone, Copy, Debug)]
@@ -128,83 +117,6 @@ impl<Q: LineQuestion> LineQuestions for std::slice::IterMut<'_, Q> {
     }
 }
 
-impl Querier {
-    /// Asks a question about a line and all objects of a shape.
-    pub(crate) fn ask_line(
-        &mut self,
-        placed: &PlacedShape<'_>,
-        question: &mut impl LineQuestion,
-    ) -> Result<(), QueryError> {
-        question.admits(&placed.shape)?;
-        for index in 0..placed.shape.objects().len() {
-            self.memory.budget.visit()?;
-            self.ask_line_of_object(placed, index, question)?;
-        }
-        Ok(())
-    }
-
-    /// Asks a question about a line and one object of a shape, which the caller has charged.
-    pub(super) fn ask_line_of_object(
-        &mut self,
-        placed: &PlacedShape<'_>,
-        index: usize,
-        question: &mut impl LineQuestion,
-    ) -> Result<(), QueryError> {
-        self.ask_lines_of_object(placed, index, &mut std::slice::from_mut(question).iter_mut())
-    }
-
-    /// Starts a query, and asks questions about lines of which each has the whole budget. If one fails, so do all.
-    pub(super) fn ask_lines<Q: LineQuestion>(
-        &mut self,
-        placed: &PlacedShape<'_>,
-        questions: &mut [Q],
-    ) -> Result<(), QueryError> {
-        self.start();
-        if !self.memory.budget.is_unlimited() {
-            return Err(self.memory.budget.error());
-        }
-        questions.first().map_or(Ok(()), |question| question.admits(&placed.shape))?;
-        for index in 0..placed.shape.objects().len() {
-            self.ask_lines_of_object(placed, index, &mut questions.iter_mut())?;
-        }
-        Ok(())
-    }
-
-    /// Asks questions about lines and one object of a shape.
-    fn ask_lines_of_object(
-        &mut self,
-        placed: &PlacedShape<'_>,
-        index: usize,
-        questions: &mut dyn LineQuestions,
-    ) -> Result<(), QueryError> {
-        let (bvh, object) = (placed.shape.bvh(), &placed.shape.objects()[index]);
-        let slot = bvh.ray_slot(placed.shape.first() + index);
-        let (memory, stats) = (&mut self.memory, &mut self.stats);
-        // A budget limits the visits of a walk, which must not depend on what was asked before.
-        let is_unlimited = memory.budget.is_unlimited();
-        let make = || self.backend.run(MakeRayTree { bvh, object }).ok().flatten();
-        let tree = if is_unlimited { slot.tree(object.record().treelets.get(), make) } else { None };
-        if let Some(tree) = tree {
-            let posed_into;
-            let into = if placed.pose.is_none() {
-                let of = (bvh.identity(), placed.shape.first() + index);
-                match &mut self.own_frame {
-                    Some((known, into)) if *known == of => into,
-                    other => &mut other.insert((of, IntoObject::new(None, object))).1,
-                }
-            } else {
-                posed_into = IntoObject::new(placed.pose.as_ref(), object);
-                &posed_into
-            };
-            return self.backend.run(AskTree { tree, placed, index, into, questions, memory, stats });
-        }
-        while let Some(posed) = questions.next() {
-            slot.spend(self.backend.run(AskObject { placed, index, posed, memory, stats })?);
-        }
-        Ok(())
-    }
-}
-
 /// What is left of a line in the box of an object.
 pub(super) struct Clipped {
     pub(super) segment: Segment,
@@ -301,7 +213,7 @@ impl Clipped {
 
     /// Returns the point of the segment that is nearest to another one, or near that.
     #[inline(always)]
-    fn nearest(&self, to: &[f32; 3]) -> Point {
+    pub(super) fn nearest(&self, to: &[f32; 3]) -> Point {
         let Segment { start, vector, .. } = &self.segment;
         let from = [0, 1, 2].map(|k| f64::from(to[k]) - start[k]);
         let squared = vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2];
@@ -348,38 +260,6 @@ pub(crate) fn range_in_box(
     (near <= far).then_some([near, far])
 }
 
-/// Asks about an object, with the features of a backend.
-struct AskObject<'a> {
-    placed: &'a PlacedShape<'a>,
-    index: usize,
-    posed: Posed<'a>,
-    memory: &'a mut WalkMemory,
-    stats: &'a mut QueryStats,
-}
-
-impl Task for AskObject<'_> {
-    /// The number of node tests.
-    type Output = Result<u64, QueryError>;
-
-    #[inline(always)]
-    fn run<I: Isa>(self, isa: I) -> Self::Output {
-        let Self { placed, index, posed, memory, stats } = self;
-        let (bvh, object) = (placed.shape.bvh(), &placed.shape.objects()[index]);
-        let into = IntoObject::new(placed.pose.as_ref(), object);
-        let Some(of) = Asked::new(placed, index, (&into, false), posed, stats) else { return Ok(0) };
-        let mut visitor = Walked {
-            test: LineFilter::new(isa, &of.clipped.segment, object.profile().directions()),
-            direction: direction(&of.clipped.direction),
-            scale: scale_of(into.size) as f32,
-            rooms: [Packet::NONE; 4],
-            of,
-        };
-        let tests = isa.run(memory.probe_walk(bvh, object, &mut visitor))?;
-        visitor.of.stats.node_tests += tests;
-        Ok(tests)
-    }
-}
-
 /// A question about an object, and what is left of its line.
 pub(super) struct Asked<'a> {
     question: &'a mut dyn LineQuestion,
@@ -423,7 +303,7 @@ impl<'a> Asked<'a> {
     }
 
     /// Lets the question decide about a triangle.
-    fn decide(&mut self, leaf: LeafPacket, lane: u8) -> Result<(), QueryError> {
+    pub(super) fn decide(&mut self, leaf: LeafPacket, lane: u8) -> Result<(), QueryError> {
         let triangle = stored(self.bvh, self.object, leaf, lane)?;
         self.decide_about(triangle, leaf, lane)
     }
@@ -445,48 +325,6 @@ impl<'a> Asked<'a> {
         let radius = self.clipped.radius;
         self.question.decide(&Candidate { triangle, radius, numbers, bvh, stored_in: object, leaf, lane })?;
         self.limit = self.clipped.share(self.question.limit());
-        Ok(())
-    }
-}
-
-/// Hands the triangles of an object that a line may meet to a question.
-struct Walked<'a> {
-    of: Asked<'a>,
-    test: LineFilter,
-    direction: [f32; 3],
-    /// The inverse of the largest side of the box, a power of two.
-    scale: f32,
-    /// Room for packets that are encoded.
-    rooms: [Packet; 4],
-}
-
-impl ProbeVisitor for Walked<'_> {
-    #[inline(always)]
-    fn bounds<I: Isa>(&self, isa: I, children: &Group) -> I::F32x4 {
-        self.test.entries(isa, children)
-    }
-
-    #[inline(always)]
-    fn limit(&self) -> f32 {
-        self.of.limit
-    }
-
-    #[inline(always)]
-    fn leaves<I: Isa>(&mut self, isa: I, leaves: &[LeafPacket]) -> Result<(), QueryError> {
-        let Self { of, direction, scale, rooms, .. } = self;
-        of.stats.packet_tests += leaves.len() as u64;
-        let (packets, valid) = of.bvh.packets(isa, of.object, leaves, rooms)?;
-        let corner = &packets[0].corners[0];
-        let near = of.clipped.nearest(&[corner[0][0], corner[1][0], corner[2][0]]);
-        let point = LocalPoint::new(&near, of.clipped.segment.error, *scale);
-        // A line may pass a rounded triangle on any side.
-        let is_rounded = of.clipped.radius > 0.0;
-        let mut left = if is_rounded { valid } else { valid & crossed(isa, packets, &point, direction) };
-        while left != 0 && of.limit >= 0.0 {
-            let at = left.trailing_zeros() as usize & 15;
-            left &= left - 1;
-            of.decide(leaves[at / 4], (at & 3) as u8)?;
-        }
         Ok(())
     }
 }

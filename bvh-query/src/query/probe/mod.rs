@@ -3,7 +3,7 @@
 pub(in crate::query) mod bounded;
 pub(crate) mod closest;
 pub(crate) mod line;
-mod line_tree;
+mod line_walks;
 pub(in crate::query) mod near;
 pub(crate) mod placed;
 pub(crate) mod point;
