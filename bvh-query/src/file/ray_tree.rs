@@ -3,7 +3,7 @@
 //! A node has the boxes of up to eight children side by side, in `f32` around the object's origin. Leaves are the leaf
 //! packets of the file. All pages and leaf blocks of the object have been checked before there is a tree.
 //!
-//! It takes about 14 bytes per triangle, and never more than 16: an object whose tree would be larger has none. It is made
+//! It takes about 14 bytes per triangle, and never more than 16, or 16 KiB: an object whose tree would be larger has none. It is made
 //! once rays have visited as many nodes as the object has, so that making it costs no more than they did.
 
 use crate::file::memory;

@@ -61,7 +61,7 @@ impl Task for MakeRayTree<'_> {
     fn run<I: Isa>(self, isa: I) -> Self::Output {
         let Self { bvh, object } = self;
         let Some(places) = self.places()? else { return Ok(None) };
-        let most = (object.triangles() * MAX_BYTES_PER_TRIANGLE).max(SMALL_BYTES);
+        let most = object.triangles().saturating_mul(MAX_BYTES_PER_TRIANGLE).max(SMALL_BYTES);
         let first = object.record().first_page.get();
         let slabs = bvh.page(object, first)?.anchor_slabs(0);
         let links = Links { kinds: 1, ..Links::NONE };

@@ -107,7 +107,7 @@ impl<V: RayVisitor> Task for RayWalk<'_, V> {
         let (mut next, mut kept, mut tests) = (RayChild::node(0), 0, 0);
         loop {
             if let Some(number) = next.as_node() {
-                let Some(node) = nodes.get(number) else { return Ok(tests) };
+                let Some(node) = nodes.get(number) else { unreachable!("a child is a node of its tree") };
                 tests += 1;
                 let mut entries = bounds;
                 for axis in 0..3 {
@@ -164,7 +164,7 @@ impl<V: RayVisitor> Task for RayWalk<'_, V> {
                     return Ok(tests);
                 }
                 kept -= 1;
-                let Some(key) = stack.get(kept) else { return Ok(tests) };
+                let Some(key) = stack.get(kept) else { unreachable!("what was kept is on the stack") };
                 if f32::from_bits((key >> 32) as u32) <= limit {
                     next = RayChild::from_bits(*key as u32);
                     break;

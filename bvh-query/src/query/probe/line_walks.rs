@@ -50,6 +50,7 @@ impl Querier {
     }
 
     /// Starts a query, and asks questions about lines of which each has the whole budget. If one fails, so do all.
+    #[cfg(feature = "parallel")]
     pub(super) fn ask_lines<Q: LineQuestion>(
         &mut self,
         placed: &PlacedShape<'_>,
