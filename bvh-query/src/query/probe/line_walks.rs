@@ -24,6 +24,9 @@ use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::leaf::Packet;
 use bvh_format::slabs::Group;
 
+/// Modules for browsers do without the tree of boxes, whose code would be a twentieth of what a page has to load.
+const HAS_TREES: bool = !cfg!(all(target_arch = "wasm32", target_os = "unknown"));
+
 impl Querier {
     /// Asks a question about a line and all objects of a shape.
     pub(crate) fn ask_line(
@@ -78,9 +81,9 @@ impl Querier {
         let slot = bvh.ray_slot(placed.shape.first() + index);
         let (memory, stats) = (&mut self.memory, &mut self.stats);
         // A budget limits the visits of a walk, which must not depend on what was asked before.
-        let is_unlimited = memory.budget.is_unlimited();
+        let may_have_tree = HAS_TREES && memory.budget.is_unlimited();
         let make = || self.backend.run(MakeRayTree { bvh, object }).ok().flatten();
-        let tree = if is_unlimited { slot.tree(object.record().treelets.get(), make) } else { None };
+        let tree = if may_have_tree { slot.tree(object.record().treelets.get(), make) } else { None };
         if let Some(tree) = tree {
             let posed_into;
             let into = if placed.pose.is_none() {
