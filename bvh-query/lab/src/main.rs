@@ -13,6 +13,7 @@ mod common;
 mod exact {
     pub(crate) mod ask;
 }
+mod oriented;
 mod output;
 mod search;
 
@@ -26,6 +27,7 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 fn main() -> ExitCode {
     let result = match &Arguments::parse().experiment {
         Experiment::Search(arguments) => search::run(arguments),
+        Experiment::Oriented(arguments) => oriented::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {
         Ok(()) => ExitCode::SUCCESS,
