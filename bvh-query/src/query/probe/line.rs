@@ -205,7 +205,9 @@ impl Clipped {
         if limit < self.start {
             -1.0
         } else if limit - self.start < self.length {
-            round_up((limit - self.start) * self.inverse_length * (1.0 + SLACK))
+            let share = (limit - self.start) * self.inverse_length * (1.0 + SLACK);
+            // The inverse of a subnormal length may be infinite, and its product with zero is no number.
+            if share.is_nan() { self.whole } else { round_up(share) }
         } else {
             self.whole
         }

@@ -153,3 +153,32 @@ fn the_tree_changes_no_answer() {
     }
     assert!(hits > asked / 4 && hits < asked, "{hits} of {asked}");
 }
+
+/// A ray that ends as soon as it starts, on a corner, names the lowest of the triangles there.
+#[test]
+fn the_shortest_rays_know_their_ties() {
+    let ball = on_lattice(sphere(3));
+    let corner = ball[0][0];
+    for turn in 0..4 {
+        let mut triangles = ball.clone();
+        let count = triangles.len();
+        triangles.rotate_left(turn * count / 4);
+        let lowest = triangles.iter().position(|triangle| triangle.contains(&corner)).unwrap() as u32;
+        let bvh = bake(&mesh(&triangles), &Default::default());
+        for querier in &mut queriers() {
+            for is_warm in [false, true] {
+                if is_warm {
+                    warm(&bvh, querier, corner);
+                }
+                // The shortest numbers have no inverse.
+                for until in [0.0, 5e-324, 1e-310, 1e-300, 1.0] {
+                    let ray = Ray::new(corner, [0.3, 0.2, 1.0]).until(until);
+                    for querier in [&mut limited(querier), &mut *querier] {
+                        let hit = querier.first_hit(&bvh, &ray).unwrap().unwrap();
+                        assert_eq!((hit.t, hit.triangle), (0.0, lowest), "{until} {turn} {is_warm}");
+                    }
+                }
+            }
+        }
+    }
+}
