@@ -159,7 +159,8 @@ impl AsRef<[u8]> for Nodes {
 #[derive(Default)]
 pub(crate) struct RaySlot {
     spent: AtomicU64,
-    tree: OnceLock<Option<RayTree>>,
+    /// In a box, because a file may have many objects that no ray ever meets.
+    tree: OnceLock<Option<Box<RayTree>>>,
 }
 
 impl RaySlot {
@@ -167,7 +168,7 @@ impl RaySlot {
     #[inline(always)]
     pub(crate) fn tree(&self, cost: u64, make: impl FnOnce() -> Option<RayTree>) -> Option<&RayTree> {
         match self.tree.get() {
-            Some(known) => known.as_ref(),
+            Some(known) => known.as_deref(),
             None if self.spent.load(Ordering::Relaxed) >= cost => self.make(make),
             None => None,
         }
@@ -176,7 +177,7 @@ impl RaySlot {
     #[cold]
     #[inline(never)]
     fn make(&self, make: impl FnOnce() -> Option<RayTree>) -> Option<&RayTree> {
-        self.tree.get_or_init(make).as_ref()
+        self.tree.get_or_init(|| make().map(Box::new)).as_deref()
     }
 
     /// Counts nodes that rays have visited without the tree, or will.
