@@ -10,7 +10,7 @@ use crate::common::{Random, mesh, queriers, random_pose, translation};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{Options, to_bytes, verify};
 use bvh_format::validate::validate;
-use bvh_query::{Bvh, Pose, QueryError};
+use bvh_query::{Bvh, Pose, QueryError, Ray};
 use cbvh_testkit::damage::damage;
 use cbvh_testkit::depth::rounds;
 use cbvh_testkit::forge::forge_any;
@@ -121,5 +121,43 @@ fn forged_pairs_do_no_harm() {
     }
     println!("{pairs} forged pairs: {opened} opened, {answered} answered, the slowest took {slowest:?}");
     assert!(opened * 2 > pairs && answered * 20 > pairs, "{opened} opened, {answered} answered");
+    assert!(slowest < Duration::from_secs(20), "{slowest:?}");
+}
+
+/// Asks so often about forged and damaged files that rays have trees of boxes, if there can be any.
+#[test]
+fn rays_along_trees_of_forged_files_do_no_harm() {
+    let files = rounds(FILES / 8);
+    let (mut random, victims) = (Random::new(81), victims());
+    let mut queriers = queriers();
+    let (mut opened, mut answered, mut slowest) = (0, 0, Duration::ZERO);
+    for number in 0..files {
+        let mut bytes = victims[random.below(victims.len())].clone();
+        if number % 2 == 0 {
+            bytes = forge_any(&mut random);
+        } else {
+            let other = &victims[random.below(victims.len())];
+            damage(&mut bytes, other, &mut random);
+            Seal::All.apply(&mut bytes);
+        }
+        let Ok(bvh) = Bvh::from_bytes(bytes) else { continue };
+        opened += 1;
+        let which = random.below(queriers.len());
+        let querier = &mut queriers[which];
+        let start = Instant::now();
+        for round in 0..60 {
+            let origin = random.point().map(|x| x * 2f64.powi(3 * (round % 5)));
+            let direction = [(); 3].map(|()| random.below(5) as f64 - 2.0);
+            let direction = if direction == [0.0; 3] { [1.0; 3] } else { direction };
+            let ray = Ray::new(origin, direction);
+            let segment = querier.segment_hit(&bvh, origin, direction);
+            let rounded = bvh.all().rounded(0.25).unwrap();
+            answered += u64::from(querier.first_hit(&bvh, &ray).is_ok() && segment.is_ok());
+            let _ = (querier.any_hit(rounded, &ray), querier.first_hit(rounded, &ray));
+        }
+        slowest = slowest.max(start.elapsed());
+    }
+    println!("{files} files: {opened} opened, {answered} rays answered, the slowest took {slowest:?}");
+    assert!(opened * 4 > files && answered > files, "{opened} opened, {answered} answered");
     assert!(slowest < Duration::from_secs(20), "{slowest:?}");
 }

@@ -4,6 +4,7 @@ use super::hard::{Mesh, direction, point};
 use super::rationals::{Rational, first};
 use crate::common::shapes::{dirty, moved, on_lattice, soup, sphere, terrain, torus};
 use crate::common::{Random, bake, mesh, note, options, queriers, random_pose, stored};
+use bvh_bake::to_bytes;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 use bvh_query::{Bvh, Pose, ProbeBatch, Querier, Ray};
@@ -180,5 +181,122 @@ fn the_shortest_rays_know_their_ties() {
                 }
             }
         }
+    }
+}
+
+/// Vertices that are no sums of `f32` numbers, in poses that stretch as much as poses may.
+#[test]
+fn rays_meet_corrected_vertices_in_poses_that_stretch() {
+    let random = &mut Random::new(55);
+    let ball = sphere(3);
+    let mut most_left_out = 0.0f32;
+    let (mut asked, mut hits) = (0, 0);
+    for (number, (factor, by)) in
+        [(1.0 / 3.0, [1e6 + 0.1, -3e5, 7.7]), (1e-3, [5e3 + 0.01, 0.1, -900.0]), (1.0, [0.0; 3])]
+            .into_iter()
+            .enumerate()
+    {
+        // Last, because the makers of shapes round to `f32`.
+        let at = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] * factor + by[k]);
+        let triangles: Vec<_> = dirty(&ball, 3).into_iter().map(|triangle| triangle.map(at)).collect();
+        let encoding = [TriangleEncoding::F32, TriangleEncoding::Packed][number % 2];
+        let bvh = bake(&mesh(&triangles), &options(Profile::Dop14U8, encoding));
+        let left_out = bvh.objects()[0].record().left_out.map(|most| most.get());
+        most_left_out = left_out.into_iter().fold(most_left_out, f32::max);
+        for stretch in [1.0, 1.0 + 0.45 / (1 << 20) as f64, 1.0 - 0.45 / (1 << 20) as f64] {
+            let turned = random_pose(random, 10.0);
+            let rows = turned.rotation().map(|row| row.map(|x| x * stretch));
+            let back = turned.place(by);
+            // The mesh is near the origin of the world, so that coordinates cancel.
+            let pose = Pose::new(rows, [0, 1, 2].map(|k| turned.translation()[k] - back[k])).unwrap();
+            let placed: Vec<_> = stored(&bvh)
+                .into_iter()
+                .map(|of| (of.corners.map(|corner| pose.place(corner)), of.id))
+                .collect();
+            let of =
+                Mesh { name: "placed", triangles: placed.iter().map(|of| of.0).collect(), is_closed: false };
+            for querier in &mut queriers() {
+                warm(&bvh, querier, triangles[0][0]);
+                for round in 0..rounds(40) {
+                    let [origin, direction] = if round % 3 == 0 {
+                        from_afar(random, &of)
+                    } else {
+                        let origin = point(random, &of);
+                        [origin, direction(random, &of, &origin)]
+                    };
+                    let mut met: Vec<(Rational, u32)> = placed
+                        .iter()
+                        .filter_map(|(corners, id)| Some((first(&origin, &direction, corners)?, *id)))
+                        .collect();
+                    met.sort_by(|x, y| x.0.compare(&y.0).then(x.1.cmp(&y.1)));
+                    let hit = querier.first_hit(bvh.all().at(&pose), &Ray::new(origin, direction)).unwrap();
+                    let found = hit.map(|hit| hit.triangle);
+                    assert_eq!(
+                        found,
+                        met.first().map(|met| met.1),
+                        "{origin:?} {direction:?} {pose:?} {by:?}"
+                    );
+                    asked += 1;
+                    hits += u32::from(found.is_some());
+                }
+            }
+        }
+    }
+    assert!(most_left_out > 0.0 && hits > asked / 4, "{most_left_out}, {hits} of {asked}");
+}
+
+/// There is no tree of a file with a damaged page. Rays that need the page are refused, and others are answered.
+#[test]
+fn a_damaged_page_has_the_error_it_had() {
+    let triangles = terrain(60, 5);
+    let file = to_bytes(&mesh(&triangles), &Default::default()).unwrap().0;
+    let good = Bvh::from_bytes(file.clone()).unwrap();
+    let pages = good.layout().page_count();
+    assert!(pages > 4, "{pages}");
+    let (mut refused, mut answered) = (0, 0);
+    for page in [pages / 2, pages - 1] {
+        let mut file = file.clone();
+        file[good.layout().page_offset(page) as usize + 100] ^= 1;
+        let bvh = Bvh::from_bytes(file).unwrap();
+        let mut querier = Querier::new().unwrap();
+        let (mut slow, mut whole) = (limited(&querier), limited(&querier));
+        for round in 0..3 {
+            for triangle in triangles.iter().step_by(7) {
+                let at = [0, 1, 2].map(|k| (triangle[0][k] + triangle[1][k] + triangle[2][k]) / 3.0);
+                let ray = Ray::new([at[0], at[1], at[2] + 0.01], [0.0, 0.0, -1.0]);
+                let hit = querier.first_hit(&bvh, &ray);
+                assert_eq!(hit, slow.first_hit(&bvh, &ray), "{round} {ray:?}");
+                match hit {
+                    Ok(hit) => {
+                        assert_eq!(Ok(hit), whole.first_hit(&good, &ray));
+                        answered += 1;
+                    }
+                    Err(_) => refused += 1,
+                }
+            }
+        }
+    }
+    assert!(refused > 10 && answered > 10, "{refused} refused, {answered} answered");
+}
+
+/// Threads that all want the tree at once have the answers of one.
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads here")]
+#[test]
+fn threads_make_one_tree() {
+    let triangles = soup(3000, 9);
+    for _ in 0..rounds(5) {
+        let bvh = bake(&mesh(&triangles), &Default::default());
+        let ask = |querier: &mut Querier| {
+            let mut random = Random::new(12);
+            let mut rays = || Ray::new(random.point(), random.point());
+            (0..400).map(|_| querier.first_hit(&bvh, &rays()).unwrap()).collect::<Vec<_>>()
+        };
+        let expected = ask(&mut limited(&Querier::new().unwrap()));
+        std::thread::scope(|scope| {
+            let threads = [(); 8].map(|()| scope.spawn(|| ask(&mut Querier::new().unwrap())));
+            for thread in threads {
+                assert_eq!(thread.join().unwrap(), expected);
+            }
+        });
     }
 }
