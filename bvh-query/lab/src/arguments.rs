@@ -15,28 +15,6 @@ pub(crate) struct Arguments {
 pub(crate) enum Experiment {
     /// Search for wrong answers for hours: pairs near the boundary of contact, and forged files
     Search(SearchArguments),
-    /// Count what slabs in frames of their own subtrees would save
-    Oriented(OrientedArguments),
-}
-
-/// Bakes pairs of meshes and bumpy balls, places them at four gaps, and counts the tests of complete walks with bounds in
-/// turned frames. Writes `oriented.csv` and `oriented.md`.
-#[derive(Debug, Args)]
-pub(crate) struct OrientedArguments {
-    /// A list of pairs: per line a kind, a name and two mesh files
-    pub(crate) pairs: PathBuf,
-    /// The folder of the mesh files
-    #[arg(long, value_name = "DIR", default_value = ".")]
-    pub(crate) meshes: PathBuf,
-    /// The number of poses per gap
-    #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) poses: u16,
-    /// The triangles of the largest of three balls; 0: no balls
-    #[arg(long, value_name = "N", default_value = "1000000")]
-    pub(crate) largest: u64,
-    /// The folder for the results
-    #[arg(long, value_name = "DIR", default_value = "target/oriented")]
-    pub(crate) out: PathBuf,
 }
 
 /// The search does the rounds that its record lacks. The number of a round determines everything in it. Each round adds

@@ -13,7 +13,6 @@ mod common;
 mod exact {
     pub(crate) mod ask;
 }
-mod oriented;
 mod output;
 mod search;
 
@@ -27,7 +26,6 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 fn main() -> ExitCode {
     let result = match &Arguments::parse().experiment {
         Experiment::Search(arguments) => search::run(arguments),
-        Experiment::Oriented(arguments) => oriented::run(arguments),
     };
     match result.and_then(|summary| output::print(&summary)) {
         Ok(()) => ExitCode::SUCCESS,
