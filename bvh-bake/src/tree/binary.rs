@@ -1,6 +1,7 @@
 //! A binary tree in one array: nodes need no allocation each, and nodes that are visited together are stored together.
 
 use super::boxes::Aabb;
+use crate::threads;
 
 /// The place of a node in its tree's array.
 pub(crate) type NodeIndex = u32;
@@ -80,6 +81,27 @@ impl<L> Tree<L> {
     pub(super) fn link(&mut self, parent: NodeIndex, children: [NodeIndex; 2]) {
         self.nodes[parent as usize].content = Content::Inner(children);
         children.iter().for_each(|&child| self.nodes[child as usize].parent = parent);
+    }
+
+    /// Adds two subtrees, and returns their roots. If the second one has many nodes, it is built apart at the same time, with room for so
+    /// many.
+    pub(super) fn add_both(
+        &mut self,
+        many: Option<usize>,
+        first: impl FnOnce(&mut Self) -> NodeIndex + Send,
+        second: impl FnOnce(&mut Self) -> NodeIndex + Send,
+    ) -> [NodeIndex; 2]
+    where
+        L: Send,
+    {
+        let Some(nodes) = many else { return [first(self), second(self)] };
+        let apart = || {
+            let mut tree = Self::with_capacity(nodes);
+            second(&mut tree);
+            tree
+        };
+        let (first, second) = threads::join(|| first(self), apart);
+        [first, self.append(second)]
     }
 
     /// Joins two trees under a new root. `bounds` is the box of both.

@@ -4,7 +4,6 @@ use super::binary::{Content, NONE, NodeIndex, Tree};
 use super::boxes::{Aabb, Binning, Cost, Reference};
 use super::swept;
 use super::{Builder, PacketTriangles};
-use crate::threads;
 use wide::f32x4;
 
 /// The number of bins along each axis of a node's box.
@@ -46,20 +45,12 @@ impl Builder {
         let (left, right) = references.split_at_mut(middle);
         let (left_scratch, right_scratch) = scratch.split_at_mut(middle);
         let index = tree.add(bounds, Content::Inner([NONE; 2]));
-        let mut add_left = |tree: &mut Tree<_>| self.node(tree, left, left_scratch, &centres[0], depth + 1);
-        let mut add_right =
-            |tree: &mut Tree<_>| self.node(tree, right, right_scratch, &centres[1], depth + 1);
-        let children = if count > MAX_SEQUENTIAL_TRIANGLES {
-            let right_tree = || {
-                let mut tree = Tree::with_capacity(expected_nodes(count - middle));
-                add_right(&mut tree);
-                tree
-            };
-            let (left, right) = threads::join(|| add_left(tree), right_tree);
-            [left, tree.append(right)]
-        } else {
-            [add_left(tree), add_right(tree)]
-        };
+        let many = (count > MAX_SEQUENTIAL_TRIANGLES).then(|| expected_nodes(count - middle));
+        let children = tree.add_both(
+            many,
+            |tree| self.node(tree, left, left_scratch, &centres[0], depth + 1),
+            |tree| self.node(tree, right, right_scratch, &centres[1], depth + 1),
+        );
         tree.link(index, children);
         index
     }

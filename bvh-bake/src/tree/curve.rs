@@ -175,20 +175,12 @@ impl Above<'_> {
         let (left, right) = items.split_at_mut(middle);
         let (left_scratch, right_scratch) = scratch.split_at_mut(middle);
         let index = tree.add(bounds, Content::Inner([NONE; 2]));
-        let mut add_left = |tree: &mut Tree<_>| self.node(tree, left, left_scratch, &centres[0], depth + 1);
-        let mut add_right =
-            |tree: &mut Tree<_>| self.node(tree, right, right_scratch, &centres[1], depth + 1);
-        let children = if count > MAX_SEQUENTIAL_TRIANGLES && threads::current_num_threads() > 1 {
-            let right_tree = || {
-                let mut tree = Tree::with_capacity(expected_nodes(count / 2));
-                add_right(&mut tree);
-                tree
-            };
-            let (left, right) = threads::join(|| add_left(tree), right_tree);
-            [left, tree.append(right)]
-        } else {
-            [add_left(tree), add_right(tree)]
-        };
+        let is_many = count > MAX_SEQUENTIAL_TRIANGLES && threads::current_num_threads() > 1;
+        let children = tree.add_both(
+            is_many.then(|| expected_nodes(count / 2)),
+            |tree| self.node(tree, left, left_scratch, &centres[0], depth + 1),
+            |tree| self.node(tree, right, right_scratch, &centres[1], depth + 1),
+        );
         tree.link(index, children);
         index
     }
