@@ -29,8 +29,9 @@ use std::sync::{Arc, Mutex, OnceLock, Weak};
 ///
 /// Opening a file reads only its head and its object table, whatever the size of the file. A page is checked when a
 /// query first touches it. An open file needs one byte of memory per page, twice the bytes of the object table, and
-/// some KiB, whatever numbers the file holds. Once rays and segments have visited as many nodes of an object as it has, the file
-/// keeps a tree of boxes for them, of up to 16 bytes per triangle. Making it reads the whole object.
+/// some KiB, whatever numbers the file holds; from the first ray or segment on, 24 bytes per object more. Once these have visited as
+/// many nodes of an object as it has, the file keeps a tree of boxes for them, of up to 16 bytes per triangle or 16 KiB. Making the tree
+/// reads the whole object, also of a file that is mapped with [`ReadAhead::Sparse`](crate::ReadAhead::Sparse).
 #[derive(Clone, Debug)]
 pub struct Bvh(Arc<OpenFile>);
 
