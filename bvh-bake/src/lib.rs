@@ -16,7 +16,7 @@
 //! # fn main() -> Result<(), bvh_bake::BakeError> {
 //! let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 //! let mesh = Mesh::from_triangles(corners, vec![[0, 1, 2]]);
-//! let (bytes, report) = to_bytes(&mesh, &Options::default().effort(Effort::Fast))?;
+//! let (bytes, report) = to_bytes(&mesh, &Options::default().effort(Effort::Quick))?;
 //! println!("{} triangle in {} bytes", report.file.triangles, bytes.len());
 //! # Ok(())
 //! # }

@@ -13,20 +13,20 @@ pub enum Effort {
     /// the suite, `collide` takes 1.05 times as long in the geometric mean, `contacts` and `distance` 1.10, rays 1.01. The pair that
     /// loses most takes 1.15 times as long, and the worst of all gaps of any pair 1.6: `distance` of two smooth meshes of 100,000
     /// triangles, a tenth of the diagonal apart. Files take 3 to 7 % more bytes (AMD EPYC, Zen 3, 2026-11-29).
-    Fast,
+    Quick,
     /// Splits near the leaves are fine; then the largest tenth of all subtrees moves to better places.
     #[default]
     Default,
 }
 
 impl Effort {
-    /// All efforts, the fastest first.
-    pub const ALL: [Self; 2] = [Self::Fast, Self::Default];
+    /// All efforts, the quickest first.
+    pub const ALL: [Self; 2] = [Self::Quick, Self::Default];
 
     /// Returns the name used in options and in the provenance.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Fast => "fast",
+            Self::Quick => "quick",
             Self::Default => "default",
         }
     }
@@ -72,8 +72,8 @@ impl Rounding {
 /// ```
 /// use bvh_bake::{Effort, Options};
 ///
-/// let options = Options::default().effort(Effort::Fast).ids(false);
-/// assert_eq!(options.effort, Effort::Fast);
+/// let options = Options::default().effort(Effort::Quick).ids(false);
+/// assert_eq!(options.effort, Effort::Quick);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]

@@ -258,7 +258,7 @@ impl<'a> Baker<'a> {
         let topology = layout.read_topology(&target.source())?;
         // A web page does not read the report, and asks the library instead. Nor does a bake of little time count.
         let is_counted =
-            options.effort != Effort::Fast && !cfg!(all(target_family = "wasm", target_os = "unknown"));
+            options.effort != Effort::Quick && !cfg!(all(target_family = "wasm", target_os = "unknown"));
         let open_edges = match is_open {
             true if !is_counted => None,
             true => Some(count_all::<_, BakeError>(&layout, &target.source(), &counting.0, counting.1)?),

@@ -111,7 +111,7 @@ impl Built {
         // Points have no extent, so that finer splits make no better tree of them.
         let method = match options.effort {
             _ if is_cloud => Method::Coarse,
-            Effort::Fast => Method::Curve,
+            Effort::Quick => Method::Curve,
             Effort::Default => Method::Fine,
         };
         let (width, bounds) = (profile.width(), &measured.bounds);

@@ -16,7 +16,7 @@ pub struct BakeReport {
     /// The reason for this layout: one sentence about the first object, or empty if the user chose the whole layout.
     pub reason: String,
     /// The edges that leave objects open; `None` if the file does not state which objects are closed, and for open objects with
-    /// `Effort::Fast` and on `wasm32-unknown-unknown`, where `bvh_query::Bvh::open_edges` counts them.
+    /// `Effort::Quick` and on `wasm32-unknown-unknown`, where `bvh_query::Bvh::open_edges` counts them.
     pub open_edges: Option<OpenEdges>,
     /// The largest error that is not coarse for an object of this size and number of triangles, in mesh units. `None`
     /// unless `Options::max_error` exceeds it, so that quantisation may have collapsed triangles that matter.

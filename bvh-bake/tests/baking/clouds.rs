@@ -59,7 +59,7 @@ fn large_clouds_have_several_bricks() {
     let (bytes, report) = to_bytes(&cloud, &Options::default()).unwrap();
     assert_eq!((report.file.triangles, report.file.duplicates), (points.len() as u64, 0));
     verify(&bytes, &cloud).unwrap();
-    assert_eq!(bytes, to_bytes(&cloud, &Options::default().effort(bvh_bake::Effort::Fast)).unwrap().0);
+    assert_eq!(bytes, to_bytes(&cloud, &Options::default().effort(bvh_bake::Effort::Quick)).unwrap().0);
 }
 
 /// A cloud has no boundary. Up to 64 points are listed as components, and more are not.

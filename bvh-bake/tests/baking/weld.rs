@@ -229,7 +229,7 @@ fn dense_vertices_take_no_quadratic_time() {
     for (name, triangles, distance) in
         [("ball", &in_cluster, 1.0), ("sphere", &on_sphere, 1.0), ("clusters", &split, 0.9999)]
     {
-        let options = Options::default().weld(distance).effort(bvh_bake::Effort::Fast);
+        let options = Options::default().weld(distance).effort(bvh_bake::Effort::Quick);
         let (_, report) = to_bytes(&mesh(triangles), &options).unwrap();
         assert!(report.file.degenerate > 0, "{name}");
     }

@@ -286,7 +286,7 @@ typedef struct cbvh_bake_options {
     const char *profile;
     /* The encoding of triangles, "f32", "packed" or "quantized"; NULL lets the baker choose one without loss. */
     const char *triangles;
-    /* The time spent on the tree: "fast", about half of the time for queries that take about 1.1 times as long, or "default"; NULL for the
+    /* The time spent on the tree: "quick", about half of the time for queries that take about 1.1 times as long, or "default"; NULL for the
      * default. */
     const char *effort;
     /* The folder for scratch files; NULL for that of the output. Files only. */

@@ -262,7 +262,7 @@ static void bakes(void) {
     } while (0)
     OPTION(profile, "dop7", "options.profile: expected NULL or one of dop14-u8");
     OPTION(triangles, "small", "options.triangles: expected NULL or one of f32, packed, quantized, found \"small\"");
-    OPTION(effort, "low", "options.effort: expected NULL or one of fast, default");
+    OPTION(effort, "low", "options.effort: expected NULL or one of quick, default");
     OPTION(effort, "\xFF", "options.effort: expected text in UTF-8");
     OPTION(round, "f16", "options.round: expected NULL or one of none, f32, found \"f16\"");
     OPTION(max_error, -1, "options.max_error: expected 0 or a finite length above 0");

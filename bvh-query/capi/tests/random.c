@@ -79,7 +79,7 @@ static const void *any_options(bool of_bake) {
         char bytes[200];
     } kinds[2];
     union any *const options = &kinds[of_bake];
-    const char *const names[] = {NULL, "", "f32", "dop6-u8", "fast", "\xC3(", "packed"};
+    const char *const names[] = {NULL, "", "f32", "dop6-u8", "quick", "\xC3(", "packed"};
     const size_t size = below(4) ? 0 : below(sizeof *options);
     memset(options, 0, sizeof *options);
     if (of_bake) {

@@ -180,7 +180,7 @@ fn any_layout(random: &mut Random, encodings: usize) -> Options {
     Options::default()
         .profile(Profile::ALL[random.below(Profile::ALL.len())])
         .triangles(encodings[random.below(encodings.len())])
-        .effort(Effort::Fast)
+        .effort(Effort::Quick)
         .topology(false)
 }
 

@@ -60,7 +60,7 @@ impl BakeOptions {
         }
         if let Some(name) = &self.effort {
             let effort = Effort::from_name(name);
-            options = options.effort(effort.ok_or_else(|| unknown("effort", name, &["fast", "default"]))?);
+            options = options.effort(effort.ok_or_else(|| unknown("effort", name, &["quick", "default"]))?);
         }
         Ok(options)
     }

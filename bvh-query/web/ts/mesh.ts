@@ -57,7 +57,7 @@ export interface BakeOptions {
     /** Moves each vertex to the first vertex within this distance of it, in mesh units, which closes seams that are open by rounding
      * errors. At most the diagonal of the mesh's box. 0 by default, which leaves vertices where they are. */
     weld?: number;
-    /** The time spent on a better tree: "fast", about half of the time for queries that take about 1.1 times as long, or "default". */
+    /** The time spent on a better tree: "quick", about half of the time for queries that take about 1.1 times as long, or "default". */
     effort?: string;
     /** Whether triangles keep their numbers from the input; else the baker numbers them in its own order. True by default. */
     ids?: boolean;

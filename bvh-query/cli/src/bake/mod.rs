@@ -226,7 +226,7 @@ pub(crate) struct BakeArguments {
     pub(crate) shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) layout: LayoutArguments,
-    /// Time spent on a better tree: fast or default. Answers are the same
+    /// Time spent on a better tree: quick or default. Answers are the same
     #[arg(long, value_name = "E", default_value = "default", value_parser = effort)]
     pub(crate) effort: Effort,
     /// With --triangles quantized: how far a vertex may move, in mesh units [default: 1e-5 of the diagonal]
@@ -281,5 +281,5 @@ pub(crate) struct BakeArguments {
 
 /// Parses the name of an effort.
 pub(crate) fn effort(name: &str) -> Result<Effort, String> {
-    Effort::from_name(name).ok_or_else(|| "expected fast or default".to_owned())
+    Effort::from_name(name).ok_or_else(|| "expected quick or default".to_owned())
 }

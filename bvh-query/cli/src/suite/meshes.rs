@@ -25,7 +25,7 @@ impl Meshes {
     /// Returns how meshes are baked, in words.
     pub(super) fn settings(&self) -> &'static str {
         match self.effort {
-            Effort::Fast => "meshes baked in memory in little time; without topology for timed questions",
+            Effort::Quick => "meshes baked in memory in little time; without topology for timed questions",
             _ => "meshes baked in memory with the default options",
         }
     }
@@ -47,7 +47,7 @@ impl Meshes {
         // Windows does not replace a file that is mapped.
         self.baked.remove(&message.mesh);
         // No timed question is about what is inside a mesh.
-        let options = self.options().topology(self.effort != Effort::Fast);
+        let options = self.options().topology(self.effort != Effort::Quick);
         let baked = bake_file(message, &options);
         let answer = baked.as_ref().map(|(_, record)| record.clone()).map_err(Clone::clone);
         self.baked.insert(message.mesh.clone(), baked.map(|(bvh, _)| bvh));

@@ -26,7 +26,7 @@ Examples:
   python spec/suite/run.py --runner 'cbvh suite'
 
 spec/suite/PROTOCOL.md defines the lines that the command reads and writes. Meshes are baked in memory with the default \
-options, or with --effort fast in less time. Those of timed questions then have no topology, which these do not need. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
+options, or with --effort quick in less time. Those of timed questions then have no topology, which these do not need. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
 
 /// What `suite` accepts.
 #[derive(Debug, Args)]
@@ -36,7 +36,7 @@ pub(crate) struct SuiteArguments {
     #[arg(long, value_name = "ISA", default_value = "auto")]
     isa: String,
 
-    /// Time spent on a better tree: fast or default. Answers are the same
+    /// Time spent on a better tree: quick or default. Answers are the same
     #[arg(long, value_name = "EFFORT", default_value = "default", value_parser = bake::effort)]
     effort: Effort,
 }

@@ -31,7 +31,7 @@ fn every_profile_and_encoding_verifies() {
 fn every_effort_verifies_and_is_noted() {
     let directory = &place();
     directory.write("torus.obj", torus(40, 20));
-    for effort in ["fast", "default"] {
+    for effort in ["quick", "default"] {
         let bake = ["bake", "torus.obj", "-o", "t.cbvh", "--json", "-q", "--effort", effort];
         assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], false);
         assert_eq!(cbvh_in(directory, &bake).done().json()["skipped"], true);
@@ -40,7 +40,7 @@ fn every_effort_verifies_and_is_noted() {
     }
     directory
         .cbvh("bake torus.obj -o t.cbvh --effort low")
-        .failed(1, &["--effort", "expected fast or default"]);
+        .failed(1, &["--effort", "expected quick or default"]);
 }
 
 #[test]

@@ -122,10 +122,10 @@ fn bytes_are_those_of_single_bakes() {
             &["--no-ids", "--triangles", "quantized", "--max-error", "0.01"],
         ),
         (
-            json!({"split_objects": true, "effort": "fast"}),
-            &["--no-ids", "--split-objects", "--effort", "fast"],
+            json!({"split_objects": true, "effort": "quick"}),
+            &["--no-ids", "--split-objects", "--effort", "quick"],
         ),
-        (json!({"split_objects": false, "effort": "fast"}), &["--no-ids", "--effort", "fast"]),
+        (json!({"split_objects": false, "effort": "quick"}), &["--no-ids", "--effort", "quick"]),
         (json!({"round": "f32"}), &["--no-ids", "--round", "f32"]),
     ];
     let line = |number: usize| {
@@ -329,7 +329,7 @@ fn a_wrong_line_is_told_by_its_number() {
         (r#"{"input": "a", "output": "b", "jobs": 3}"#, "unknown field `jobs`"),
         (r#"{"input": "a", "output": "b", "profile": "dop7"}"#, "profile: expected auto, dop14-u8"),
         (r#"{"input": "a", "output": "b", "triangles": "f64"}"#, "triangles: expected auto, f32"),
-        (r#"{"input": "a", "output": "b", "effort": "low"}"#, "effort: expected fast"),
+        (r#"{"input": "a", "output": "b", "effort": "low"}"#, "effort: expected quick"),
         (r#"{"input": "a", "output": "b", "round": "f16"}"#, "round: expected none or f32"),
         (r#"{"input": "a", "output": "b", "max_error": 0.1}"#, "quantized"),
         (r#"{"input": "a", "output": "b", "triangles": "quantized", "max_error": -1}"#, "above 0"),

@@ -96,7 +96,7 @@ def bake(
     distance of it, in mesh units. Triangles that lose their area stay. BakeError if it exceeds the diagonal of the mesh's box.
     Without ``ids``, the baker numbers triangles in its own order. Without ``topology``, there are no answers about what
     is inside. ``radius`` and ``solid`` are those of `Mesh.rounded` and `Mesh.solid`, and stay in the file. Baking takes
-    about a microsecond per triangle, half of that with ``effort="fast"``, after which queries take about 1.1 times as long. `Mesh.save` writes the result. ``round="f32"`` rounds each coordinate to the nearest float32
+    about a microsecond per triangle, half of that with ``effort="quick"``, after which queries take about 1.1 times as long. `Mesh.save` writes the result. ``round="f32"`` rounds each coordinate to the nearest float32
     number, ties to even, as games store them: coordinates that are equal in two meshes then stay equal.
 
     Answers are exact for the numbers that are given, which are stored as they are, float64 numbers too. Vertices move only if that
