@@ -99,15 +99,16 @@ impl Instance {
 }
 
 /// Returns how far `R R^T` is from a multiple of I: the largest entry of the difference, or NaN.
+#[inline]
 pub fn departure(rotation: &[[f64; 3]; 3], multiple: f64) -> f64 {
+    let [x, y, z] = *rotation;
+    // The product is symmetric, to the bit.
+    let products = [dot(x, x), dot(y, y), dot(z, z), dot(x, y), dot(x, z), dot(y, z)];
+    let expected = [multiple, multiple, multiple, 0.0, 0.0, 0.0];
     // The bits of magnitudes are in the order of the magnitudes, and those of NaN are greater than all others.
     let mut worst = 0;
-    for i in 0..3 {
-        // The product is symmetric, to the bit.
-        for j in i..3 {
-            let error = dot(rotation[i], rotation[j]) - if i == j { multiple } else { 0.0 };
-            worst = worst.max(error.abs().to_bits());
-        }
+    for k in 0..6 {
+        worst = worst.max((products[k] - expected[k]).abs().to_bits());
     }
     f64::from_bits(worst)
 }

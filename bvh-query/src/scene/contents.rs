@@ -141,6 +141,19 @@ impl Contents {
         self.broad.settle();
     }
 
+    /// Moves some instances, and their boxes. The boxes above them are computed once.
+    pub(super) fn place_each(&mut self, poses: &[(u32, Pose)]) {
+        for (place, world) in poses {
+            if let Some(instance) = &mut self.instances[*place as usize] {
+                // From the pose that was given: a copy could not be read before it is written.
+                instance.bounds = instance.bounds_at(world);
+                instance.world = *world;
+                self.broad.set_box(instance.item(*place));
+            }
+        }
+        self.broad.settle();
+    }
+
     /// Changes an instance, and its box, but not the boxes above.
     fn change_one(&mut self, place: u32, change: impl FnOnce(&mut Instance)) {
         if let Some(instance) = &mut self.instances[place as usize] {

@@ -348,7 +348,7 @@ impl Scene {
     /// Moves the instances in some places to poses that are valid.
     fn move_to(&mut self, poses: &[(u32, Pose)]) -> Result<(), SceneError> {
         if self.contents.move_alone(poses.iter().map(|&(place, _)| place)) {
-            self.contents_mut().change_each(poses.iter().copied(), |instance, world| instance.world = world);
+            self.contents_mut().place_each(poses);
         } else {
             let moves = self.contents.moves(poses)?;
             self.contents_mut().carry_out(moves);

@@ -113,8 +113,8 @@ impl Node {
     /// Computes what is around all children. Returns whether it has changed.
     fn unite(&mut self) -> bool {
         let bounds = OuterBox {
-            lo: self.lo.map(|ends| fold(ends, self.count, |x, y| if y < x { y } else { x })),
-            hi: self.hi.map(|ends| fold(ends, self.count, |x, y| if y > x { y } else { x })),
+            lo: self.lo.map(|ends| fold(ends, |x, y| if y < x { y } else { x })),
+            hi: self.hi.map(|ends| fold(ends, |x, y| if y > x { y } else { x })),
         };
         let union = self.groups[..self.count].iter().fold(Groups::NONE, |union, groups| union.union(*groups));
         let is_new = (bounds, union) != (self.bounds, self.union);
@@ -123,16 +123,21 @@ impl Node {
     }
 }
 
-/// Combines the first lanes, half of them with the other half at a time.
-fn fold(mut ends: [f32; WIDTH], count: usize, less: impl Fn(f32, f32) -> f32) -> f32 {
-    let mut half = count.next_power_of_two() / 2;
-    while half > 0 {
-        for lane in 0..half {
-            ends[lane] = less(ends[lane], ends[lane + half]);
-        }
-        half /= 2;
+/// Combines all lanes, half of them with the other half at a time. Empty lanes change nothing.
+#[inline(always)]
+fn fold(mut ends: [f32; WIDTH], less: impl Fn(f32, f32) -> f32) -> f32 {
+    fold_half::<8>(&mut ends, &less);
+    fold_half::<4>(&mut ends, &less);
+    fold_half::<2>(&mut ends, &less);
+    less(ends[0], ends[1])
+}
+
+/// Combines as many lanes with as many behind them. Compilers turn a loop of fixed length into vector code.
+#[inline(always)]
+fn fold_half<const HALF: usize>(ends: &mut [f32; WIDTH], less: &impl Fn(f32, f32) -> f32) {
+    for lane in 0..HALF {
+        ends[lane] = less(ends[lane], ends[lane + HALF]);
     }
-    ends[0]
 }
 
 /// A tree. Node 0 is the root, and children follow their parents.
