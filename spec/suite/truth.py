@@ -187,26 +187,31 @@ def is_closed(triangles):
 DIRECTIONS = ((1, 0, 0), (3, 5, 7), (-11, 4, 9), (13, -17, 6), (101, 57, -31), (-997, 1009, 1013), (4099, -57, 10007))
 
 
-def winding(point, triangles):
-    """Returns how often a closed surface winds around a point that is not on it, from the signed crossings of a ray.
+def winding_along(point, d, triangles):
+    """Returns how often a closed surface winds around a point that is not on it, from the signed crossings of a ray in direction d.
 
-    A ray that meets an edge, a corner or the plane of a triangle edgewise says nothing, so the next direction is tried.
+    Returns None if the ray meets an edge, a corner or the plane of a triangle edgewise, which says nothing.
     """
+    total = 0
+    for t in triangles:
+        n = normal(t)
+        if n == ZERO:
+            continue
+        slope, height = dot(n, d), dot(n, sub(t[0], point))
+        turns = [dot(d, cross(sub(t[i], point), sub(t[j], point))) for i, j in EDGES]
+        if all(v > 0 for v in turns) or all(v < 0 for v in turns):
+            if slope and height * slope > 0:
+                total += 1 if slope > 0 else -1
+        elif all(v >= 0 for v in turns) or all(v <= 0 for v in turns):
+            if slope == 0 and height == 0 or slope and height * slope > 0:
+                return None
+    return total
+
+
+def winding(point, triangles):
+    """Returns how often a closed surface winds around a point that is not on it, along the first direction that says it."""
     for d in DIRECTIONS:
-        total = 0
-        for t in triangles:
-            n = normal(t)
-            if n == ZERO:
-                continue
-            slope, height = dot(n, d), dot(n, sub(t[0], point))
-            turns = [dot(d, cross(sub(t[i], point), sub(t[j], point))) for i, j in EDGES]
-            if all(v > 0 for v in turns) or all(v < 0 for v in turns):
-                if slope and height * slope > 0:
-                    total += 1 if slope > 0 else -1
-            elif all(v >= 0 for v in turns) or all(v <= 0 for v in turns):
-                if slope == 0 and height == 0 or slope and height * slope > 0:
-                    break
-        else:
+        if (total := winding_along(point, d, triangles)) is not None:
             return total
     raise ValueError("no direction avoids all edges")
 
