@@ -46,7 +46,7 @@ impl Meshes {
     pub(super) fn add_file(&mut self, message: &MeshFile) -> Result<Record, String> {
         // Windows does not replace a file that is mapped.
         self.baked.remove(&message.mesh);
-        // No timed question is about what is inside a mesh.
+        // Of timed questions, only that for sides needs it: it is refused after a quick bake.
         let options = self.options().topology(self.effort != Effort::Quick);
         let baked = bake_file(message, &options);
         let answer = baked.as_ref().map(|(_, record)| record.clone()).map_err(Clone::clone);

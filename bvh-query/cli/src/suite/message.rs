@@ -15,8 +15,12 @@ pub(super) enum Message {
     File(MeshFile),
     /// Instances of meshes, which later lines name together.
     Field(FieldMessage),
+    /// A set of rays or points in a file, which later lines name.
+    Probes(ProbesMessage),
     /// A question about many poses of meshes that were sent, to be timed.
     Timed(TimedQuestion),
+    /// A question about all rays or points of a set, to be timed.
+    Probed(ProbedQuestion),
     /// A question about meshes that were sent.
     Question(Box<Question>),
 }
@@ -69,6 +73,30 @@ pub(super) struct TimedQuestion {
     /// No pose is begun after so many seconds.
     pub(super) budget: f64,
     /// All poses in one call, on all cores.
+    #[serde(default)]
+    pub(super) batch: bool,
+}
+
+/// Rays or points, whose numbers are in a file as little-endian `f32`.
+#[derive(Debug, Deserialize)]
+pub(super) struct ProbesMessage {
+    pub(super) probes: String,
+    pub(super) file: PathBuf,
+    pub(super) count: usize,
+    /// 3 for points. 6 for rays: the origin, then the direction.
+    pub(super) numbers: usize,
+}
+
+/// A question about a set of rays or points.
+#[derive(Debug, Deserialize)]
+pub(super) struct ProbedQuestion {
+    pub(super) id: u64,
+    pub(super) ask: String,
+    pub(super) a: String,
+    pub(super) probes: String,
+    /// No ray or point is begun after so many seconds.
+    pub(super) budget: f64,
+    /// All in one call, on all cores.
     #[serde(default)]
     pub(super) batch: bool,
 }

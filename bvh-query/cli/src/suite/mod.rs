@@ -7,6 +7,7 @@
 mod ask;
 mod meshes;
 mod message;
+mod probed;
 mod timed;
 
 use crate::asking;
@@ -17,6 +18,7 @@ use bvh_query::Querier;
 use clap::Args;
 use meshes::Meshes;
 use message::{Hello, Message, Numbered};
+use probed::{PROBED, Probes};
 use std::io::{BufRead as _, Write as _};
 use timed::Fields;
 
@@ -26,7 +28,7 @@ Examples:
   python spec/suite/run.py --runner 'cbvh suite'
 
 spec/suite/PROTOCOL.md defines the lines that the command reads and writes. Meshes are baked in memory with the default \
-options, or with --effort quick in less time. Those of timed questions then have no topology, which these do not need. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
+options, or with --effort quick in less time. Those of timed questions then have no topology, so that sides are refused. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
 
 /// What `suite` accepts.
 #[derive(Debug, Args)]
@@ -52,14 +54,18 @@ const MAX_DISTANCE_ERROR_OF_SIZE: f64 = 1e-14;
 /// Answers each line of standard input with one line on standard output.
 pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
     let mut querier = Querier::with_backend(asking::backend(&arguments.isa)?);
-    let (mut meshes, mut fields) = (Meshes::of_effort(arguments.effort), Fields::default());
+    let mut known = Known {
+        meshes: Meshes::of_effort(arguments.effort),
+        fields: Fields::default(),
+        probes: Probes::default(),
+    };
     let mut output = std::io::stdout().lock();
     for line in std::io::stdin().lock().split(b'\n') {
         let line = line.map_err(|error| Failure::System(format!("standard input: cannot read: {error}")))?;
         if line.trim_ascii().is_empty() {
             continue;
         }
-        let answer = answer(&line, &mut meshes, &mut fields, &mut querier);
+        let answer = answer(&line, &mut known, &mut querier);
         writeln!(output, "{answer}")
             .and_then(|()| output.flush())
             .map_err(|error| Failure::from_output(&error))?;
@@ -67,8 +73,16 @@ pub(crate) fn run(arguments: &SuiteArguments) -> Result<(), Failure> {
     Ok(())
 }
 
+/// What later lines name.
+struct Known {
+    meshes: Meshes,
+    fields: Fields,
+    probes: Probes,
+}
+
 /// Answers one line.
-fn answer(line: &[u8], meshes: &mut Meshes, fields: &mut Fields, querier: &mut Querier) -> Record {
+fn answer(line: &[u8], known: &mut Known, querier: &mut Querier) -> Record {
+    let Known { meshes, fields, probes } = known;
     match serde_json::from_slice(line) {
         Ok(Message::Hello(Hello { hello: PROTOCOL })) => hello(meshes.settings()),
         Ok(Message::Hello(Hello { hello })) => {
@@ -82,6 +96,13 @@ fn answer(line: &[u8], meshes: &mut Meshes, fields: &mut Fields, querier: &mut Q
         Ok(Message::Field(field)) => {
             let seconds = fields.add(&field, meshes).map(|seconds| record! { seconds: seconds });
             about(record! { field: field.field }, seconds)
+        }
+        Ok(Message::Probes(set)) => {
+            let count = probes.add(&set).map(|count| record! { count: count });
+            about(record! { probes: set.probes }, count)
+        }
+        Ok(Message::Probed(question)) => {
+            about(record! { id: question.id }, probed::ask(&question, meshes, probes, querier))
         }
         Ok(Message::Timed(question)) => {
             about(record! { id: question.id }, timed::ask(&question, meshes, fields, querier))
@@ -114,8 +135,8 @@ fn hello(settings: &str) -> Record {
         coordinates: "f64",
         placement: "f64",
         questions: ask::QUESTIONS,
-        timed: ["collide", "distance", "contacts", "touched"],
-        batch: ["collide", "distance"],
+        timed: [["collide", "distance", "contacts", "touched"], PROBED].concat(),
+        batch: [&["collide", "distance"][..], &PROBED].concat(),
         features: ["open", "concave", "degenerate", "nested", "overlapping parts", "range", "refuses"],
         distance_error: MAX_DISTANCE_ERROR_OF_SIZE,
         error_unit: "size",

@@ -64,38 +64,41 @@ pub(super) fn ask(
 ) -> Result<Record, String> {
     let poses: Vec<Pose> =
         question.poses.iter().map(|rows| Pose::from_rows(rows).map_err(text)).collect::<Result<_, _>>()?;
-    let (name, b) = (question.b.as_str(), meshes.get(&question.b)?);
+    let (name, b, budget) = (question.b.as_str(), meshes.get(&question.b)?, question.budget);
     let Some(field) = fields.0.get_mut(&question.a) else {
         let a = meshes.get(&question.a)?;
         return match (question.ask.as_str(), question.batch) {
-            ("collide", true) => batch(&poses, |poses| {
-                Ok(Batch::new(a, b)
-                    .map_err(text)?
-                    .collide(poses)
-                    .map_err(text)?
-                    .into_iter()
-                    .map(f64::from)
-                    .collect())
-            }),
-            ("distance", true) => batch(&poses, |poses| {
-                let found = Batch::new(a, b).map_err(text)?.distances(poses).map_err(text)?;
-                Ok(found.into_iter().map(|answer| answer.distance).collect())
-            }),
-            ("collide", false) => {
-                one_by_one(question, &poses, |pose| querier.collide(a, b, pose).map(f64::from))
-            }
+            ("collide", true) => batch(
+                &poses,
+                |poses| Batch::new(a, b).map_err(text)?.collide(poses).map_err(text),
+                |touches| Ok(f64::from(touches)),
+            ),
+            ("distance", true) => batch(
+                &poses,
+                |poses| Batch::new(a, b).map_err(text)?.distances(poses).map_err(text),
+                |found| Ok(found.distance),
+            ),
+            ("collide", false) => one_by_one(
+                budget,
+                &poses,
+                |pose| querier.collide(a, b, pose),
+                |touches| Ok(f64::from(touches)),
+            ),
             ("distance", false) => {
-                one_by_one(question, &poses, |pose| querier.distance(a, b, pose).map(|found| found.distance))
+                one_by_one(budget, &poses, |pose| querier.distance(a, b, pose), |found| Ok(found.distance))
             }
-            ("contacts", false) => one_by_one(question, &poses, |pose| {
-                querier.contacts(a, b, pose).map(|found| found.len() as f64)
-            }),
+            ("contacts", false) => one_by_one(
+                budget,
+                &poses,
+                |pose| querier.contacts(a, b, pose),
+                |found| Ok(found.len() as f64),
+            ),
             (other, _) => Err(format!("expected collide, distance or contacts, found {other:?}")),
         };
     };
     let instance = field.moving(name, b)?;
     let scene = &mut field.scene;
-    one_by_one(question, &poses, |pose| {
+    let ask = |pose: &Pose| {
         scene.set_pose(instance, *pose).map_err(text)?;
         match question.ask.as_str() {
             "collide" => scene.collide().map(f64::from).map_err(text),
@@ -105,38 +108,46 @@ pub(super) fn ask(
             }
             other => Err(format!("expected collide, touched or distance, found {other:?}")),
         }
-    })
+    };
+    one_by_one(budget, &poses, ask, Ok)
 }
 
-/// Asks about one pose after another, until all are asked or the budget is spent.
-fn one_by_one<E: ToString>(
-    question: &TimedQuestion,
-    poses: &[Pose],
-    mut ask: impl FnMut(&Pose) -> Result<f64, E>,
+/// Asks about one after another, until all are asked or the budget, in seconds, is spent. `number` makes a number of an answer,
+/// which is not timed.
+pub(super) fn one_by_one<T, A, E: ToString>(
+    budget: f64,
+    items: &[T],
+    mut ask: impl FnMut(&T) -> Result<A, E>,
+    number: impl Fn(A) -> Result<f64, String>,
 ) -> Result<Record, String> {
     let began = Instant::now();
     let (mut answers, mut nanoseconds) = (Vec::new(), Vec::new());
-    for pose in poses {
+    for item in items {
         let start = Instant::now();
-        let answer = ask(pose);
+        let answer = ask(item);
         nanoseconds.push(start.elapsed().as_nanos() as u64);
-        answers.push(answer.map_err(text)?);
-        if began.elapsed().as_secs_f64() > question.budget {
+        answers.push(number(answer.map_err(text)?)?);
+        if began.elapsed().as_secs_f64() > budget {
             break;
         }
     }
     Ok(record! { answers: answers, nanoseconds: nanoseconds })
 }
 
-/// Asks about all poses in one call, on all cores.
-fn batch(poses: &[Pose], ask: impl Fn(&[Pose]) -> Result<Vec<f64>, String>) -> Result<Record, String> {
+/// Asks about all in one call, on all cores. `number` makes a number of an answer, which is not timed.
+pub(super) fn batch<T, A>(
+    items: &[T],
+    ask: impl Fn(&[T]) -> Result<Vec<A>, String>,
+    number: impl Fn(A) -> Result<f64, String>,
+) -> Result<Record, String> {
     let start = Instant::now();
-    let answers = ask(poses)?;
+    let answers = ask(items)?;
     let seconds = start.elapsed().as_secs_f64();
+    let answers = answers.into_iter().map(number).collect::<Result<Vec<_>, _>>()?;
     Ok(record! { answers: answers, seconds: seconds, threads: rayon::current_num_threads() })
 }
 
 /// Returns the message of an error.
-fn text(error: impl ToString) -> String {
+pub(super) fn text(error: impl ToString) -> String {
     error.to_string()
 }

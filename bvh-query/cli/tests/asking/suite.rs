@@ -4,6 +4,7 @@ use crate::common::place;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// Sends each line only when the line before has been answered, as the suite does.
@@ -185,13 +186,18 @@ fn a_line_that_is_no_json_is_refused() {
     }
 }
 
+/// Writes a tetrahedron with edges of length 1 along the axes, as timed questions send it.
+fn write_tetrahedron(file: &Path) {
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].map(f32::to_le_bytes);
+    let triangles = [0_u32, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].map(u32::to_le_bytes);
+    std::fs::write(file, [corners.as_flattened(), triangles.as_flattened()].concat()).unwrap();
+}
+
 #[test]
 fn timed_questions_have_a_time_for_each_pose() {
     let place = place();
     let file = place.join("tetrahedron.mesh");
-    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].map(f32::to_le_bytes);
-    let triangles = [0_u32, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3].map(u32::to_le_bytes);
-    std::fs::write(&file, [corners.as_flattened(), triangles.as_flattened()].concat()).unwrap();
+    write_tetrahedron(&file);
     let mesh = |triangles| json!({"mesh": "t", "file": file, "corners": 4, "triangles": triangles});
     let asked = |a: &str, ask: &str| {
         let poses = [at(3.0, 0.0, 0.0), at(0.5, 0.25, 0.0)];
@@ -250,6 +256,54 @@ fn timed_questions_have_a_time_for_each_pose() {
     let counts: Vec<_> =
         answers[2..].iter().map(|answer| answer["answers"].as_array().unwrap().len()).collect();
     assert_eq!(counts, [1, 1, 2]);
+}
+
+#[test]
+fn rays_and_points_are_timed_one_by_one_and_in_one_call() {
+    let place = place();
+    let write = |name: &str, numbers: &[f32]| {
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        std::fs::write(place.join(name), bytes).unwrap();
+    };
+    write_tetrahedron(&place.join("mesh"));
+    write("rays", &[0.25, 0.25, -1.0, 0.0, 0.0, 2.0, 5.0, 5.0, 5.0, 1.0, 0.0, 0.0]);
+    write("points", &[0.125, 0.125, 0.125, -1.0, 0.25, 0.25, 0.25, 0.25, 0.0]);
+    let mesh = json!({"mesh": "t", "file": place.join("mesh"), "corners": 4, "triangles": 4});
+    let set = |name: &str, count: u64, numbers: u64| json!({"probes": name, "file": place.join(name), "count": count, "numbers": numbers});
+    let asked = |id: u32, ask: &str, probes: &str, batch: bool| json!({"id": id, "ask": ask, "a": "t", "probes": probes, "budget": 60.0, "batch": batch});
+    let questions = [("ray", "rays"), ("hit", "rays"), ("closest", "points"), ("side", "points")];
+    let expected = [json!([0.5, -1.0]), json!([1.0, 0.0]), json!([0.125, 1.0, 0.0]), json!([1.0, -1.0, 0.0])];
+    let mut lines = vec![mesh, set("rays", 2, 6), set("points", 3, 3)];
+    lines.extend(questions.iter().map(|(ask, probes)| asked(1, ask, probes, false)));
+    lines.extend(questions.iter().map(|(ask, probes)| asked(2, ask, probes, true)));
+    let answers = talk(&lines);
+    assert_eq!(
+        answers[1..3],
+        [json!({"probes": "rays", "count": 2}), json!({"probes": "points", "count": 3})]
+    );
+    for (singles, (all, expected)) in answers[3..7].iter().zip(answers[7..].iter().zip(&expected)) {
+        assert_eq!((&singles["answers"], &all["answers"]), (expected, expected));
+        assert_eq!(singles["nanoseconds"].as_array().unwrap().len(), expected.as_array().unwrap().len());
+        assert!(all["seconds"].as_f64().unwrap() > 0.0 && all["threads"].as_u64().unwrap() > 0);
+    }
+    let mut one = asked(1, "ray", "rays", false);
+    one["budget"] = json!(0.0);
+    lines.truncate(3);
+    lines.extend([
+        one,
+        asked(1, "closest", "rays", false),
+        asked(1, "ray", "points", true),
+        asked(1, "ray", "unknown", false),
+        set("rays", 3, 6),
+        set("rays", u64::MAX, 6),
+        set("points", 9, 1),
+        set("none", 1, 3),
+    ]);
+    let answers = talk(&lines);
+    assert_eq!(answers[3]["answers"], json!([0.5]));
+    for answer in &answers[4..] {
+        assert_eq!(answer["refused"], json!(true), "{answer}");
+    }
 }
 
 #[test]
