@@ -31,7 +31,25 @@ def segment(a, question):
     return {"answer": int(found[0]) >= 0}
 
 
+def origins_and_directions(rays):
+    return np.ascontiguousarray(rays[:, :3]), np.ascontiguousarray(rays[:, 3:])
+
+
+def first_hits(a, rays):
+    return a.run(*rays, output=True)
+
+
+def parameters(found):
+    return np.where(found["primID"] < 0, -1.0, found["tfar"])
+
+
+def any_hits(a, rays):
+    return a.run(*rays, query="OCCLUDED")
+
+
 serve(
     "Embree", version("embreex"), "robust scene, single precision", mesh, {"ray": ray, "segment": segment},
+    batches={"ray": (origins_and_directions, first_hits, parameters), "hit": (origins_and_directions, any_hits, lambda found: np.asarray(found) >= 0)},
+    prepare=lambda a: a.run(*np.ones((2, 1, 3), np.float32)),
     coordinates="f32", placement="f32", features=["open", "concave", "overlapping parts"], distance_error=1e-5, error_unit="size",
 )  # fmt: skip

@@ -43,13 +43,14 @@ def resident():
         return None
 
 
-def mesh_of_file(message, make_mesh):
-    """Returns the mesh of a file, and how long it took and how much memory."""
+def mesh_of_file(message, make_mesh, prepare):
+    """Returns the mesh of a file, prepared for questions, and how long it took and how much memory."""
     data = np.fromfile(message["file"], "<u4")
     corners, triangles = np.split(data, [3 * message["corners"]])
     corners, triangles = corners.view("<f4").astype(float).reshape(-1, 3), triangles.astype(int).reshape(-1, 3)
     before, start = resident(), time.perf_counter()
     mesh = make_mesh(corners, triangles)
+    prepare(mesh)
     seconds, after = time.perf_counter() - start, resident()
     return mesh, {"seconds": seconds} | ({} if before is None else {"bytes": after - before})
 
@@ -69,20 +70,44 @@ def timed(question, meshes, timers):
     return {"answers": answers, "nanoseconds": nanoseconds}
 
 
-def serve(name, version, settings, make_mesh, questions, timers=None, **claims):
-    """Answers lines until there are no more. A timer is three functions: to a pose of the library, to its answer, to a number."""
+def probes_of_file(message):
+    """Returns the rays or points of a file, one per row."""
+    return np.fromfile(message["file"], "<f4").reshape(message["count"], message["numbers"])
+
+
+def in_one_call(question, mesh, sets, batches):
+    """Returns the answers about all rays or points of a set, and the seconds of the call, which has what the batch has made of the set."""
+    if not question.get("batch") or question["ask"] not in batches:
+        raise Refused("not a question of this runner")
+    made_of, ask, numbers = batches[question["ask"]]
+    probes = made_of(sets[question["probes"]])
+    start = time.perf_counter()
+    found = ask(mesh, probes)
+    seconds = time.perf_counter() - start
+    return {"answers": np.asarray(numbers(found), float).tolist(), "seconds": seconds}
+
+
+def cores():
+    """Returns how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+def serve(name, version, settings, make_mesh, questions, timers=None, batches=None, threads=1, prepare=lambda mesh: None, **claims):
+    """Answers lines until there are no more. A timer is three functions: to a pose of the library, to its answer, to a number. So is a
+    batch, about a whole set of rays or points and all answers, with as many threads as are stated. `prepare` builds for timed questions what the
+    library would build when it is first asked."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    known = {}
+    known, sets, batches = {}, {}, batches or {}
     for line in sys.stdin:
         message = json.loads(line)
         if "hello" in message:
-            answer = {"hello": HELLO, "name": name, "version": version, "settings": settings, "questions": list(questions), "timed": list(timers or ()), **claims}
+            answer = {"hello": HELLO, "name": name, "version": version, "settings": settings, "questions": list(questions), "timed": list(timers or ()), "batch": list(batches), **claims}
         elif "mesh" in message:
             answer = {"mesh": message["mesh"]}
             try:
                 if "file" in message:
-                    known[message["mesh"]], cost = mesh_of_file(message, make_mesh)
+                    known[message["mesh"]], cost = mesh_of_file(message, make_mesh, prepare)
                     answer |= cost
                 else:
                     corners, triangles = finite(message["vertices"], (-1, 3)), np.array(message["triangles"], int).reshape(-1, 3)
@@ -90,13 +115,19 @@ def serve(name, version, settings, make_mesh, questions, timers=None, **claims):
             except Exception as reason:
                 known[message["mesh"]] = None
                 answer |= {"refused": True, "reason": str(reason)}
+        elif "file" in message:
+            sets[message["probes"]] = probes_of_file(message)
+            answer = {"probes": message["probes"]}
         else:
             answer = {"id": message["id"]}
             meshes = [known.get(message[key]) for key in ("a", "b") if key in message]
             try:
                 if any(mesh is None for mesh in meshes):
                     raise Refused("a mesh was refused")
-                answer |= timed(message, meshes, timers) if "poses" in message else questions[message["ask"]](*meshes, message)
+                if "probes" in message:
+                    answer |= in_one_call(message, *meshes, sets, batches) | {"threads": threads}
+                else:
+                    answer |= timed(message, meshes, timers) if "poses" in message else questions[message["ask"]](*meshes, message)
             except Refused as reason:
                 answer |= {"refused": True, "reason": str(reason)}
         answers.write(json.dumps(answer) + "\n")

@@ -5,7 +5,8 @@
 The time of a pose is the median over the steady rounds, and a cell has the median of these over the poses. The 99th percentile is over all
 single queries. A library with a wrong answer in a cell counts neither as best nor as other there. One whose budget did not suffice for all
 poses has fewer of them: its time is about the first ones. The subject is the library that the ratios are about. The page has the ratios,
-and what the subject loses comes first; the CSV files have all times. Needs Python alone.
+and what the subject loses comes first; the CSV files have all times. Rays and points are nanoseconds per ray or point, which run.py has
+already reduced in the same way. Needs Python alone.
 """
 
 import argparse
@@ -26,8 +27,17 @@ QUESTIONS = {
     "contacts": "Which pairs of triangles touch?",
     "touched": "How many instances of the field does the mesh touch?",
 }
+# Questions about rays and points, one by one and in one call.
+PROBED = {
+    "ray": "What does the ray hit first?",
+    "hit": "Does the ray hit anything?",
+    "closest": "How far is the point from the mesh?",
+    "side": "Is the point inside?",
+}
 # What the summary is about: meshes that just touch, that are just apart, and that are near.
 SHORT = {("collide", "touching"): "collide, touching", ("collide", "0.0001%"): "collide, 0.0001 % apart", ("distance", "1%"): "distance, 1 % apart"}
+# What it costs until a mesh that was never seen has its first answer.
+FIRST_COSTS = ("build, ms", "first answer from the mesh, ms")
 SCALING = ("scan-1k", "scan-10k", "scan-100k")
 
 
@@ -44,13 +54,23 @@ class Cell:
         self.p99 = ordered[min(len(ordered), ceil(0.99 * len(ordered))) - 1]
 
 
+class ProbedCell:
+    """What one library needed for one question about a kind of rays or points, in nanoseconds for each."""
+
+    def __init__(self, record):
+        self.median, self.p99, self.cold, self.wrong = (record[key] for key in ("median", "p99", "cold", "wrong"))
+        self.count, self.checked, self.threads = (record[key] for key in ("count", "checked", "threads"))
+
+
 def read(folder):
-    """Returns the head, what builds cost, what batches took, who failed, and the cells by question, pair, preset and library."""
-    head, builds, batches, failed, cells = None, [], [], [], {}
+    """Returns the head, what builds cost, what batches took, who failed, the cells by question, pair, preset and library, and those of rays and points by question, in one call or not, mesh, kind and library."""
+    head, builds, batches, failed, cells, probed = None, [], [], [], {}, {}
     for line in (folder / "times.jsonl").read_text(encoding="utf-8").splitlines():
         record = json.loads(line)
         if "ask" in record:
             cells.setdefault((record["ask"], record["pair"], record["preset"]), {})[record["runner"]] = Cell(record["rounds"], record["wrong"])
+        elif "probe" in record:
+            probed.setdefault((record["probe"], record["batch"], record["mesh"], record["kind"]), {})[record["runner"]] = ProbedCell(record)
         elif "batch" in record:
             batches.append(record)
         elif "failed" in record:
@@ -59,7 +79,7 @@ def read(folder):
             builds.append(record)
         else:
             head = record
-    return head, builds, batches, failed, cells
+    return head, builds, batches, failed, cells, probed
 
 
 def microseconds(nanoseconds):
@@ -72,9 +92,14 @@ def table(names, rows):
     return lines + ["| " + " | ".join(row) + " |" for row in rows]
 
 
+def is_own(name, subject):
+    """Tells whether a runner is the subject, or the subject with other options."""
+    return name == subject or name.startswith(subject + ", ")
+
+
 def best_other(row, subject):
     """Returns the fastest other library whose answers are right, or None."""
-    others = [(cell.median, name) for name, cell in row.items() if name != subject and not cell.wrong]
+    others = [(cell.median, name) for name, cell in row.items() if not is_own(name, subject) and not cell.wrong]
     return min(others, default=None)
 
 
@@ -92,7 +117,8 @@ def ordered(cells, question):
 def summary(builds, cells, subject):
     """Returns a row for each pair: the subject beside the best other library, where most is to be done."""
     rows = []
-    triangles = {record["pair"]: record["triangles"].values() for record in builds}
+    asked = {pair for _, pair, _ in cells}
+    triangles = {record["pair"]: record["triangles"].values() for record in builds if record["pair"] in asked}
     for pair, counts in triangles.items():
         row = [pair, ", ".join(f"{count:,}" for count in counts)]
         for question, preset in SHORT:
@@ -182,27 +208,88 @@ def builds_file(builds):
 
 
 def build_table(builds, subject):
-    """Returns a row for each pair: what the subject costs, and what is least among the others."""
+    """Returns a row for each pair or mesh and the options of the subject: what it costs, and what is least among the others."""
     names, rows = list(costs(builds[0])), []
-    for record in (record for record in builds if record["runner"] == subject):
-        others = [other for other in builds if other["pair"] == record["pair"] and other is not record]
+    for record in (record for record in builds if is_own(record["runner"], subject)):
         cells = []
         for name, own in costs(record).items():
-            best = min(((costs(other)[name], other["runner"]) for other in others if costs(other)[name] is not None), default=None)
+            best = least_other(builds, record, name, subject)
             cells += [short(own), f"{short(best[0])}, {best[1]}" if best else ""]
-        rows.append([record["pair"], *cells])
+        rows.append([record["pair"] + record["runner"][len(subject) :], *cells])
     return table(["pair", *(head for name in names for head in (name, "least other"))], rows)
 
 
-def later_pairs(builds, subject):
-    """Returns the pairs of which another library gives the first answer from the mesh sooner."""
-    ready = lambda record: costs(record)["first answer from the mesh, ms"]
+def least_other(builds, record, name, subject):
+    """Returns the least cost of another library where the subject has a record, and whose it is, or None."""
+    others = [other for other in builds if other["pair"] == record["pair"] and not is_own(other["runner"], subject)]
+    return min(((costs(other)[name], other["runner"]) for other in others if costs(other)[name] is not None), default=None)
+
+
+def lost_builds(builds, subject):
+    """Returns a row for each pair or mesh, and the options of the subject, where another library builds faster or gives the first answer from the mesh sooner."""
+    rows = []
+    for record in (record for record in builds if is_own(record["runner"], subject)):
+        cells = []
+        for name in FIRST_COSTS:
+            own, best = costs(record)[name], least_other(builds, record, name, subject)
+            is_lost = own is not None and best is not None and best[0] < own
+            cells += [short(own), f"{short(best[0])}, {best[1]}" if is_lost else "", f"{own / best[0]:.2f}" if is_lost else ""]
+        if any(cells[1::3]):
+            rows.append([record["pair"], record["runner"], *cells])
+    return rows
+
+
+def probed_losses(probed, subject):
+    """Returns a row for each question about rays and points where another library is faster and right, the farthest behind first."""
     found = []
-    for record in (record for record in builds if record["runner"] == subject and ready(record) is not None):
-        others = [ready(other) for other in builds if other["pair"] == record["pair"] and other is not record]
-        if any(other is not None and other < ready(record) for other in others):
-            found.append(record["pair"])
-    return found
+    for (question, is_batch, mesh, kind), row in probed.items():
+        share = ratio(row, subject)
+        if share is not None and share < 1:
+            other, name = best_other(row, subject)
+            found.append((share, [titled(question, is_batch), mesh, kind, f"{row[subject].median:,.0f}", name, f"{other:,.0f}", f"{1 / share:.2f}"]))
+    return [row for _, row in sorted(found)]
+
+
+def titled(question, is_batch):
+    return f"{question}, in one call" if is_batch else question
+
+
+def probed_table(probed, question, is_batch, names, subject):
+    """Returns a row for each mesh and kind: the times of all libraries, and how many times as long as the subject the best other one takes."""
+    rows = {key[2:]: row for key, row in probed.items() if key[:2] == (question, is_batch)}
+    names = [name for name in names if any(name in row for row in rows.values())]
+    wrong = lambda cell: f" ({len(cell.wrong)} wrong)" if cell.wrong else ""
+    cells = lambda row: [f"{row[name].median:,.0f}{wrong(row[name])}" if name in row else "" for name in names]
+    last = lambda share: f"{share:.2f}" if share else ""
+    return table(["mesh", "kind", *names, "best other / " + subject], [[*key, *cells(row), last(ratio(row, subject))] for key, row in rows.items()])
+
+
+def probed_lines(builds, probed, names, subject):
+    """Returns the section about rays and points."""
+    checked = max(cell.checked for row in probed.values() for cell in row.values())
+    lines = ["", "## Rays and points", "", "Nanoseconds for each ray or point, on the same core, one by one or in one call. *best other* is the fastest other library that is right. Libraries in Python",
+             f"are asked in one call only, because a call from Python costs more than an answer. Of each kind, {checked:,} answers are checked."]  # fmt: skip
+    for question, title in PROBED.items():
+        if any(key[0] == question for key in probed):
+            lines += ["", f"### {title} (`{question}`)"]
+            for is_batch in (False, True):
+                if any(key[:2] == (question, is_batch) for key in probed):
+                    lines += ["", "In one call:" if is_batch else "One by one:", "", *probed_table(probed, question, is_batch, names, subject)]
+    meshes = [pair for pair in dict.fromkeys(record["pair"] for record in builds) if pair.startswith("probes/")]
+    if meshes:
+        built = {(record["pair"], record["runner"]): short(costs(record)["build, ms"]) for record in builds}
+        makers = [name for name in names if any((mesh, name) in built for mesh in meshes)]
+        lines += ["", "### Builds for them, ms", "", *table(["mesh", *makers], [[mesh[7:], *(built.get((mesh, name), "") for name in makers)] for mesh in meshes])]
+    return lines
+
+
+def probes_file(probed):
+    """Returns the CSV file of all rays and points, in nanoseconds."""
+    rows = []
+    for (question, is_batch, mesh, kind), row in probed.items():
+        for name, cell in row.items():
+            rows.append([question, "one call" if is_batch else "one by one", mesh, kind, name, cell.threads, cell.count, cell.checked, len(cell.wrong), *(f"{x:.1f}" for x in (cell.median, cell.p99, cell.cold))])
+    return comma_separated(["question", "asked", "mesh", "kind", "library", "threads", "count", "checked", "wrong", "median", "99th percentile", "cold"], rows)
 
 
 def plot(title, labels, lines, x_title, colours):
@@ -248,19 +335,23 @@ def plots(cells, names):
     return found
 
 
-def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
+def page(head, builds, batches, failed, cells, probed, subject, drawn, folder, readme):
     """Returns the lines of the page of results. Its plots and CSV files are in a folder."""
     wrong = sum(len(cell.wrong) for row in cells.values() for cell in row.values())
     lost = losses(cells, subject)
     compared = sum(ratio(row, subject) is not None for row in cells.values())
+    probed_wrong = sum(len(cell.wrong) for row in probed.values() for cell in row.values())
+    probed_compared = sum(ratio(row, subject) is not None for row in probed.values())
     where = f"on one {'pinned ' if head['pinned'] else ''}core of {head['processor']}, {head['system']}"
     plotted = lambda wanted: [f"![{file[:-4]}]({folder}{file})" for file in drawn if wanted(file)]
     of_size = lambda file: file.endswith("-scaling.svg")
     lines = ["# Speed", "", f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}.", "",
              "Times are medians over the poses, in microseconds. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away, where",
-             f"`collide` shows the cost of a call. By the proofs, {wrong or 'no'} answers are wrong, counted once for each pose. A library with a wrong answer in a cell",
-             f"is not counted as best there. [queries.csv]({folder}queries.csv) and [builds.csv]({folder}builds.csv) have all times.", f"[What is timed]({readme})", "",
-             "## In short", "", *summary(builds, cells, subject), ""]  # fmt: skip
+             f"`collide` shows the cost of a call. By the proofs, {wrong + probed_wrong or 'no'} answers are wrong, counted once for each pose, ray and point. A library with a wrong answer in a cell",
+             f"is not counted as best there. [queries.csv]({folder}queries.csv)"
+             + (f", [probes.csv]({folder}probes.csv)" if probed else "")
+             + f" and [builds.csv]({folder}builds.csv) have all times.", f"[What is timed]({readme})", "",
+             *(["## In short", "", *summary(builds, cells, subject), ""] if cells else [])]  # fmt: skip
     if sizes := plotted(of_size):
         lines += [*sizes, ""]
     lines += [f"## Where {subject} loses", ""]
@@ -268,17 +359,26 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
         lines += [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
     else:
         lines.append(f"No other library is faster in any of {compared} comparisons of queries.")
-    if later := later_pairs(builds, subject):
-        lines += ["", f"The first answer from the mesh, the build included, comes later than that of another library for {', '.join(later)}."]
+    if probed:
+        if lost := probed_losses(probed, subject):
+            lines += ["", f"In {len(lost)} of {probed_compared} comparisons of rays and points, another library is faster, in nanoseconds:", ""]
+            lines += table(["question", "mesh", "kind", subject, "faster", "its time", "times as fast"], lost)
+        else:
+            lines += ["", f"No other library is faster in any of {probed_compared} comparisons of rays and points."]
+    if lost := lost_builds(builds, subject):
+        lines += ["", "Other libraries build faster, or give the first answer from the mesh sooner, build included:", ""]
+        lines += table(["pair", "options", *(head for name in FIRST_COSTS for head in (name, "faster", "times as fast"))], lost)
     lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes that answers correctly."]
     for question, title in QUESTIONS.items():
         if any(key[0] == question for key in cells):
             lines += ["", f"### {title} (`{question}`)", "", *ratio_table(cells, question, subject)]
             if charts := plotted(lambda file: file.startswith(question + "-") and file.endswith(".svg") and not of_size(file)):
                 lines += ["", *charts]
+    if probed:
+        lines += probed_lines(builds, probed, list(head["runners"]), subject)
     if wrong:
         lines += ["", "## Wrong answers", "", *wrong_table(cells)]
-    lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds, subject)]
+    lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together; a mesh of rays and points by itself. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds, subject)]
     if batches:
         lines += ["", "## Many poses in one call, on all cores", "", "The time per query, by question and gap.", "", *batch_table(batches)]
     if failed:
@@ -289,12 +389,14 @@ def page(head, builds, batches, failed, cells, subject, drawn, folder, readme):
 
 def made(folder, place, subject=None):
     """Returns the plots and CSV files of the raw times in a folder, by name, and the page that is to be in a place."""
-    head, builds, batches, failed, cells = read(folder)
+    head, builds, batches, failed, cells, probed = read(folder)
     names = list(head["runners"])
     subject = subject or ("cbvh" if "cbvh" in names else names[0])
     drawn = plots(cells, names) | {"queries.csv": queries_file(cells), "builds.csv": builds_file(builds)}
+    if probed:
+        drawn["probes.csv"] = probes_file(probed)
     to_folder, readme = (Path(os.path.relpath(to, place.parent)).as_posix() for to in (folder, Path(__file__).parent / "README.md"))
-    lines = page(head, builds, batches, failed, cells, subject, drawn, "" if to_folder == "." else to_folder + "/", readme)
+    lines = page(head, builds, batches, failed, cells, probed, subject, drawn, "" if to_folder == "." else to_folder + "/", readme)
     return drawn, "\n".join(lines) + "\n"
 
 

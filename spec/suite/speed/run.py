@@ -1,7 +1,7 @@
 """Times libraries on the same meshes and poses, one query after another, and checks each answer against what is proved.
 
     python run.py --out DIR [--core 1] [--only PATTERN] [--runner NAME=COMMAND ...]
-    python run.py --out DIR --smoke --runner NAME=COMMAND           seconds: few poses of two small pairs
+    python run.py --out DIR --smoke --runner NAME=COMMAND           seconds: few poses of two small pairs, few rays and points
 
 Without --runner, all runners that are found are asked, and the others are named with what installs them. Each runner is a process
 of its own. Rounds are interleaved: each question is put to one runner after another, and then again. The raw times go to
@@ -18,12 +18,14 @@ import shutil
 import sys
 import tempfile
 import time
+from math import ceil
 from pathlib import Path
 
 import numpy as np
 
 import forms
 import poses
+import probes
 import report
 
 SUITE = forms.HERE.parent
@@ -37,13 +39,19 @@ HELLO_SECONDS = 60
 # A build or a round of questions may take so many seconds beyond the budget.
 PATIENCE = 300
 ASKED = {"collide": (*poses.PRESETS, "touching", "deep"), "distance": (*poses.PRESETS, "touching"), "contacts": ("touching", "deep"), "touched": ("touching", "deep")}
+# Questions about rays and points, and the kinds of them. A runner answers singly, in one call, or both.
+PROBED = {"ray": probes.RAYS, "hit": probes.RAYS, "closest": probes.POINTS, "side": probes.POINTS}
 # What the first question is about, when nothing has been asked yet.
 FIRST = ("collide", "1%")
-SMOKE = ("scan-1k", "field")
+SMOKE = ("scan-1k", "field", "probes/scan-10k")
+SMOKE_PROBES = 3 * probes.STEP
 NATIVE = "speed/setup (cmake, the libraries)"
+# Asked for its builds and first answers only.
+QUICK = "cbvh, quick"
 # Name, command and what installs it. {suite} is the folder of the suite, {bin} the folder of what has been built, {python} this Python.
 RUNNERS = (
     ("cbvh", "cbvh suite", "cargo install cbvh, or a folder with it in PATH"),
+    (QUICK, "cbvh suite --effort quick", "cargo install cbvh, or a folder with it in PATH"),
     *((f"Coal {bv}", f"{{bin}}/coal_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
     *((f"FCL {bv}", f"{{bin}}/fcl_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
     ("parry3d", "{bin}/parry-runner", "speed/setup (cargo)"),
@@ -51,6 +59,12 @@ RUNNERS = (
     ("PQP", "{bin}/pqp_native", "PQP=FOLDER speed/setup, where FOLDER has a built PQP, if its licence allows you to use it"),
     ("Coal, Python", "{python} {suite}/runners/coal_runner.py", "pip install coal"),
     ("FCL, Python", "{python} {suite}/runners/fcl_runner.py", "pip install python-fcl"),
+    *((f"Embree {flag}", f"{{bin}}/embree_native {flag}", NATIVE) for flag in ("robust", "fast")),
+    ("embreex, Python", "{python} {suite}/runners/embree_runner.py", "pip install embreex trimesh scipy rtree"),
+    ("trimesh, Python", "{python} {suite}/runners/trimesh_runner.py", "pip install embreex trimesh scipy rtree"),
+    ("Open3D, Python", "{python} {suite}/runners/open3d_runner.py", "pip install open3d-cpu"),
+    ("FCPW, Python", "{python} {suite}/runners/fcpw_runner.py", "pip install fcpw"),
+    ("libigl, Python", "{python} {suite}/runners/igl_runner.py", "pip install libigl scipy"),
 )
 
 
@@ -83,14 +97,21 @@ class Runner:
 
     def ask(self, what, a, b, items, budget, **more):
         """Asks about poses, and returns the answers and their times in nanoseconds, or None if the library refuses."""
+        return self.put({"ask": what, "a": a, "b": b, "poses": [pose for pose, _ in items], "budget": budget, **more}, len(items))
+
+    def put(self, question, count):
+        """Puts a timed question about so many poses, rays or points."""
         self.number += 1
-        message = {"id": self.number, "ask": what, "a": a, "b": b, "poses": [pose for pose, _ in items], "budget": budget, **more}
-        answer, _ = self.process.exchange(message, PATIENCE + budget)
+        answer, _ = self.process.exchange({"id": self.number, **question}, PATIENCE + question["budget"])
         if answer.get("refused"):
             return None
-        if answer.get("id") != self.number or not is_timed(answer, len(items), "batch" in more):
+        if answer.get("id") != self.number or not is_timed(answer, count, question.get("batch", False)):
             raise Garbage(answer)
         return answer
+
+    def answers(self, what, is_batch):
+        """Tells whether a runner answers a question, one by one or in one call."""
+        return what in (self.profile.get("batch", ()) if is_batch else self.profile["timed"])
 
 
 def is_timed(answer, count, is_batch):
@@ -113,6 +134,22 @@ def is_right(what, answer, fact, size, profile):
     return answer == (float(touches) if what == "collide" else fact[what])
 
 
+class Probed:
+    """What one runner has answered about the rays or points of a kind, singly or in one call."""
+
+    def __init__(self):
+        self.rounds, self.wrong, self.count, self.checked, self.threads = [], set(), 0, 0, 1
+
+    def record(self):
+        """Returns the time per ray or point in nanoseconds: the median over them of the median over the rounds after the first."""
+        cold, steady = self.rounds[0], self.rounds[1:] or self.rounds
+        count = max(map(len, steady))
+        each = [np.median([times[k] for times in steady if k < len(times)]) for k in range(count)]
+        every = np.sort(np.concatenate(steady))
+        p99 = every[min(len(every), ceil(0.99 * len(every))) - 1]
+        return {"median": float(np.median(each)), "p99": float(p99), "cold": float(np.median(cold)), "wrong": sorted(self.wrong)}
+
+
 class Measurement:
     """The runners of one call, the file of raw times, and how many answers were wrong."""
 
@@ -130,7 +167,8 @@ class Measurement:
         known = forms.catalogue()
         a, b = known["pairs"][name]
         field = known["fields"].get(a)
-        able = [runner for runner in self.runners if not field or "touched" in self.profile_of(runner)["timed"]]
+        asked = ("touched",) if field else ASKED
+        able = [runner for runner in self.runners if set(asked) & set(self.profile_of(runner)["timed"])]
         if not able:
             return
         made = {mesh: forms.make(known["meshes"][mesh]) for mesh in sorted({*(field["meshes"] if field else [a]), b})}
@@ -139,6 +177,7 @@ class Measurement:
         largest = max(float(np.abs(corners).max()) for corners, _ in made.values())
         size = {preset: max(largest, of) for preset, of in size.items()}
         ready = [runner for runner in able if self.attempt(runner, name, self.prepare, runner, name, made, a, field, folder, items)]
+        ready = self.asked_more(ready)
         for number in range(1 + self.arguments.rounds):
             for what, presets in ASKED.items():
                 for preset in (p for p in presets if what in ("collide", "distance") or what in items[p][0][1]):
@@ -153,6 +192,14 @@ class Measurement:
         for cell in self.cells.values():
             self.write(cell)
         self.cells.clear()
+
+    @staticmethod
+    def asked_more(runners):
+        """Returns the runners that are asked for more than their builds and first answers, and stops the others."""
+        for runner in runners:
+            if runner.name == QUICK:
+                runner.stop()
+        return [runner for runner in runners if runner.name != QUICK]
 
     def attempt(self, runner, name, what, *arguments):
         """Does something with a runner, and returns whether it works. One that fails is out for this pair."""
@@ -169,12 +216,10 @@ class Measurement:
         runner.start()
         record = {"runner": runner.name, "pair": name, "triangles": {mesh: len(faces) for mesh, (_, faces) in made.items()}, "meshes": {}}
         for mesh, (corners, faces) in made.items():
-            file = folder / f"{len(list(folder.iterdir()))}.mesh"
-            file.write_bytes(forms.content(corners, faces))
-            answer = runner.send("mesh", {"mesh": mesh, "file": str(file), "corners": len(corners), "triangles": len(faces)})
-            if answer.get("refused"):
+            cost = self.send_mesh(runner, mesh, corners, faces, folder)
+            if cost is None:
                 return False
-            record["meshes"][mesh] = {key: answer.get(key) for key in ("seconds", "open_seconds", "bytes")}
+            record["meshes"][mesh] = cost
         if field:
             numbers, rows = forms.instances(field)
             sent = {"field": a, "meshes": field["meshes"], "instances": [[n, row] for n, row in zip(numbers, rows)]}
@@ -183,6 +228,14 @@ class Measurement:
         found = runner.ask(FIRST[0], a, b, items[FIRST[1]][:1], self.arguments.budget) if FIRST[0] in runner.profile["timed"] else None
         self.write(record | {"first_nanoseconds": found["nanoseconds"][0] if found else None})
         return True
+
+    @staticmethod
+    def send_mesh(runner, mesh, corners, faces, folder):
+        """Sends a mesh, and returns what its build cost, or None if the library refuses it."""
+        file = folder / f"{len(list(folder.iterdir()))}.mesh"
+        file.write_bytes(forms.content(corners, faces))
+        answer = runner.send("mesh", {"mesh": mesh, "file": str(file), "corners": len(corners), "triangles": len(faces)})
+        return None if answer.get("refused") else {key: answer.get(key) for key in ("seconds", "open_seconds", "bytes")}
 
     def profile_of(self, runner):
         if runner.profile is None:
@@ -211,7 +264,7 @@ class Measurement:
             return
         items = [item for _ in range(20) for item in poses.load(name)["1%"]]
         for runner in self.runners:
-            if self.profile_of(runner).get("batch"):
+            if set(self.profile_of(runner).get("batch", ())) & set(ASKED) and runner.name != QUICK:
                 self.attempt(runner, name, self.batch, Runner(runner.name, runner.unpinned), name, a, b, items, folder)
 
     def batch(self, runner, name, a, b, items, folder):
@@ -223,12 +276,71 @@ class Measurement:
                 file = folder / f"{mesh}.all"
                 file.write_bytes(forms.content(corners, faces))
                 runner.send("mesh", {"mesh": mesh, "file": str(file), "corners": len(corners), "triangles": len(faces)})
-            for what in runner.profile["batch"]:
+            for what in (what for what in runner.profile["batch"] if what in ASKED):
                 found = [runner.ask(what, a, b, items, self.arguments.budget, batch=True) for _ in range(self.arguments.rounds)]
                 best = min(answer["seconds"] for answer in found)
                 self.write({"runner": runner.name, "pair": name, "batch": what, "preset": "1%", "queries": len(items), "seconds": best, "threads": found[0]["threads"]})
         finally:
             runner.stop()
+        return True
+
+    def probes(self, name, mesh, folder):
+        """Puts all questions about rays and points of one mesh to all runners, singly and in one call."""
+        corners, faces = forms.make(forms.catalogue()["meshes"][mesh])
+        count = SMOKE_PROBES if self.arguments.smoke else probes.COUNT
+        sets = {kind: (of[:count], facts[: len(range(0, count, probes.STEP))]) for kind, (of, facts) in probes.load(mesh).items()}
+        able = [runner for runner in self.runners if set(PROBED) & {*self.profile_of(runner)["timed"], *runner.profile.get("batch", ())}]
+        ready = [runner for runner in able if self.attempt(runner, name, self.prepare_probes, runner, name, mesh, corners, faces, sets, folder)]
+        ready = self.asked_more(ready)
+        cells, size = {}, float(np.abs(corners).max())
+        for number in range(1 + self.arguments.rounds):
+            for what, kind in ((what, kind) for what, kinds in PROBED.items() for kind in kinds):
+                # What is inside an open mesh is not proved.
+                if what == "side" and len(sets[kind][1][0]) < 3:
+                    continue
+                first = number % max(1, len(ready))
+                for runner in ready[first:] + ready[:first]:
+                    for is_batch in (False, True):
+                        if runner.answers(what, is_batch) and runner in ready:
+                            cell = cells.setdefault((runner.name, what, kind, is_batch), Probed())
+                            if not self.attempt(runner, name, self.probe, runner, mesh, what, kind, is_batch, *sets[kind], size, cell):
+                                ready.remove(runner)
+        for runner in ready:
+            runner.stop()
+        for (runner, what, kind, is_batch), cell in cells.items():
+            if cell.rounds:
+                self.write({"runner": runner, "mesh": mesh, "probe": what, "kind": kind, "batch": is_batch, "count": cell.count, "checked": cell.checked, "threads": cell.threads, **cell.record()})
+
+    def prepare_probes(self, runner, name, mesh, corners, faces, sets, folder):
+        """Starts a runner, sends the mesh and the rays and points, asks about one ray, and tells whether the runner takes part."""
+        runner.start()
+        cost = self.send_mesh(runner, mesh, corners, faces, folder)
+        if cost is None:
+            return False
+        for kind, (of, _) in sets.items():
+            file = folder / f"{mesh}-{kind}.probes"
+            file.write_bytes(of.astype("<f4").tobytes())
+            runner.send("probes", {"probes": kind, "file": str(file), "count": len(of), "numbers": of.shape[1]})
+        # A budget of nothing is enough for one ray.
+        first = runner.put({"ask": "ray", "a": mesh, "probes": "camera", "budget": 0.0}, len(sets["camera"][0])) if "ray" in runner.profile["timed"] else None
+        self.write({"runner": runner.name, "pair": name, "triangles": {mesh: len(faces)}, "meshes": {mesh: cost}, "first_nanoseconds": first["nanoseconds"][0] if first else None})
+        return True
+
+    def probe(self, runner, mesh, what, kind, is_batch, of, facts, size, cell):
+        """Asks one runner one question about a set. Of a batch that takes longer than the budget, there are two rounds."""
+        budget = self.arguments.budget
+        if is_batch and len(cell.rounds) > 1 and cell.rounds[-1][0] * len(of) > 1e9 * budget:
+            return True
+        more = {"batch": True} if is_batch else {}
+        answer = runner.put({"ask": what, "a": mesh, "probes": kind, "budget": budget, **more}, len(of))
+        if answer is None:
+            return True
+        found = answer["answers"][:: probes.STEP]
+        wrong = [k for k, (one, fact) in enumerate(zip(found, facts)) if not probes.is_right(what, one, of[k * probes.STEP], fact, size, runner.profile)]
+        self.wrong, self.asked = self.wrong + len(wrong), self.asked + len(found)
+        cell.rounds.append(np.array([1e9 * answer["seconds"] / len(of)] if is_batch else answer["nanoseconds"], float))
+        cell.wrong |= {*wrong}
+        cell.count, cell.checked, cell.threads = len(answer["answers"]), len(found), answer.get("threads", 1)
         return True
 
 
@@ -267,7 +379,7 @@ def main(argv=None):
     parser.add_argument("--page", help="the file of the page with the tables; DIR/SPEED.md")
     parser.add_argument("--runner", action="append", metavar="NAME=COMMAND", help="ask this runner only; may be repeated")
     parser.add_argument("--bin", default="target/speed/bin", help="the folder of the runners that setup has built")
-    parser.add_argument("--only", default="", help="only pairs with one of these texts in their name, separated by commas")
+    parser.add_argument("--only", default="", help="only pairs with one of these texts in their name, separated by commas; rays and points of a mesh are probes/MESH")
     parser.add_argument("--rounds", type=int, default=5, help="rounds after the first, which counts as cold")
     parser.add_argument("--sample", type=int, default=1, metavar="N", help="every Nth pose")
     parser.add_argument("--budget", type=float, default=1.0, help="seconds after which a round of one question begins no other pose")
@@ -285,11 +397,13 @@ def main(argv=None):
             profiles = {runner.name: {key: measurement.profile_of(runner).get(key) for key in ("name", "version", "settings")} for runner in runners}
             suite = (SUITE / "VERSION").read_text(encoding="utf-8").strip()
             measurement.write({"date": str(datetime.date.today()), "processor": machine(), "system": platform.system(), "pinned": arguments.core is not None, "rounds": arguments.rounds, "suite": suite, "runners": profiles})
-            for name in forms.catalogue()["pairs"]:
+            asked = {name: [measurement.pair, measurement.batches] for name in forms.catalogue()["pairs"]}
+            asked |= {f"probes/{mesh}": [lambda name, folder, mesh=mesh: measurement.probes(name, mesh, folder)] for mesh in probes.MESHES}
+            for name, measure in asked.items():
                 if any(text in name for text in arguments.only.split(",")):
                     try:
-                        measurement.pair(name, Path(folder))
-                        measurement.batches(name, Path(folder))
+                        for what in measure:
+                            what(name, Path(folder))
                         print(f"{name}: done after {time.monotonic() - began:.0f} s", file=sys.stderr)
                     except forms.Missing as missing:
                         print(f"{name}: skipped, {missing}", file=sys.stderr)

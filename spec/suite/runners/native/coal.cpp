@@ -46,6 +46,7 @@ template <class BV> struct Coal {
   using Pose = Transform3s;
   using Object = CollisionObject;
   static constexpr bool has_fields = true;
+  static constexpr bool has_probes = false;
 
   static std::shared_ptr<Mesh> mesh(const std::vector<Point>& corners, const std::vector<Face>& faces) {
     return model<Mesh, Vec3s, Triangle>(corners, faces);

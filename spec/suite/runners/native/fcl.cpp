@@ -44,6 +44,7 @@ template <class BV> struct Fcl {
   using Pose = Transform3d;
   using Object = CollisionObjectd;
   static constexpr bool has_fields = true;
+  static constexpr bool has_probes = false;
 
   static std::shared_ptr<Mesh> mesh(const std::vector<Point>& corners, const std::vector<Face>& faces) {
     return model<Mesh, Vector, Triangle>(corners, faces);

@@ -15,6 +15,7 @@ struct Pqp {
   struct Object {};
   struct Field {};
   static constexpr bool has_fields = false;
+  static constexpr bool has_probes = false;
 
   static std::shared_ptr<Mesh> mesh(const std::vector<Point>& corners, const std::vector<Face>& faces) {
     auto made = std::make_shared<Mesh>();

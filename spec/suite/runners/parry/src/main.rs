@@ -5,7 +5,7 @@
 //! `leaf_pairs` that `intersection_test` confirms. Meshes that overlap themselves are not claimed, because the nearest triangle
 //! does not tell what is inside them.
 //!
-//! Timed questions are put as an application would, with a pose of parry3d.
+//! Timed questions are put as an application would, with a pose, a ray or a point of parry3d.
 
 use parry3d_f64::bounding_volume::BoundingVolume;
 use parry3d_f64::math::{Matrix, Pose, Rotation, Vector};
@@ -88,21 +88,77 @@ fn timed(question: &Value, a: &TriMesh, b: &TriMesh) -> Result<Value, String> {
     let list = question["poses"].as_array().ok_or("expected poses")?;
     let poses: Vec<Vec<f64>> =
         list.iter().map(|x| numbers(&json!({ "x": x }), "x")).collect::<Result<_, _>>()?;
+    let poses: Vec<Pose> = poses
+        .iter()
+        .map(|m| {
+            let column = |i: usize| Vector::new(m[i], m[4 + i], m[8 + i]);
+            let turn = Rotation::from_mat3(&Matrix::from_cols(column(0), column(1), column(2)));
+            Pose::from_parts(column(3), turn)
+        })
+        .collect();
+    one_by_one(question, &poses, |pose| ask(a, b, pose), |answer| answer.map_err(|reason| reason.to_string()))
+}
+
+/// Asks about one after another until the budget is spent. What makes a number of an answer is not timed.
+fn one_by_one<T, A>(
+    question: &Value,
+    items: &[T],
+    ask: impl Fn(&T) -> A,
+    number: impl Fn(A) -> Result<f64, String>,
+) -> Result<Value, String> {
     let budget = question["budget"].as_f64().ok_or("expected a budget")?;
     let (began, mut answers, mut nanoseconds) = (Instant::now(), vec![], vec![]);
-    for m in poses {
-        let column = |i: usize| Vector::new(m[i], m[4 + i], m[8 + i]);
-        let turn = Rotation::from_mat3(&Matrix::from_cols(column(0), column(1), column(2)));
-        let pose = Pose::from_parts(column(3), turn);
+    for item in items {
         let start = Instant::now();
-        let answer = ask(a, b, &pose);
+        let answer = ask(item);
         nanoseconds.push(start.elapsed().as_nanos() as u64);
-        answers.push(answer.map_err(|reason| reason.to_string())?);
+        answers.push(number(answer)?);
         if began.elapsed().as_secs_f64() > budget {
             break;
         }
     }
     Ok(json!({ "answers": answers, "nanoseconds": nanoseconds }))
+}
+
+/// The rays of a set, or points as rays without a direction.
+fn set_of_file(message: &Value) -> Result<Vec<Ray>, String> {
+    let bytes = std::fs::read(message["file"].as_str().unwrap_or("")).map_err(|e| e.to_string())?;
+    let number = |x: &[u8]| f64::from(f32::from_le_bytes([x[0], x[1], x[2], x[3]]));
+    let numbers: Vec<f64> = bytes.chunks_exact(4).map(number).collect();
+    let columns = message["numbers"].as_u64().ok_or("expected how many numbers a row has")? as usize;
+    let ray = |row: &[f64]| match row.len() {
+        6 => Ray::new(Vector::from_slice(&row[..3]), Vector::from_slice(&row[3..])),
+        _ => Ray::new(Vector::from_slice(&row[..3]), Vector::ZERO),
+    };
+    Ok(numbers.chunks_exact(columns).map(ray).collect())
+}
+
+/// Answers a question about all rays or points of a set, and times each answer by itself.
+fn probed(question: &Value, a: &TriMesh, set: &[Ray]) -> Result<Value, String> {
+    if question["batch"] == json!(true) {
+        return Err("parry3d has no batches".into());
+    }
+    let yes = |yes: bool| Ok(f64::from(u8::from(yes)));
+    match question["ask"].as_str().unwrap_or("") {
+        "ray" => {
+            one_by_one(question, set, |ray| a.cast_local_ray(ray, f64::MAX, false), |t| Ok(t.unwrap_or(-1.0)))
+        }
+        "hit" => one_by_one(question, set, |ray| a.intersects_local_ray(ray, f64::MAX), yes),
+        "closest" => one_by_one(
+            question,
+            set,
+            |point| a.distance_to_local_point(point.origin, false),
+            |signed| Ok(signed.abs()),
+        ),
+        "side" if !is_closed(a) => Err("not a closed mesh".into()),
+        "side" => one_by_one(
+            question,
+            set,
+            |point| a.contains_local_point(point.origin),
+            |inside| Ok(if inside { 1.0 } else { -1.0 }),
+        ),
+        _ => Err("not a timed question of this runner".into()),
+    }
 }
 
 /// Returns B with its corners at R x + t.
@@ -126,9 +182,12 @@ fn from_surface(a: &TriMesh, point: Vector) -> f64 {
     (a.project_local_point(point, false).point - point).length()
 }
 
+fn is_closed(a: &TriMesh) -> bool {
+    a.topology().is_some_and(|found| found.half_edges.iter().all(|edge| edge.twin != u32::MAX))
+}
+
 fn side(a: &TriMesh, point: Vector) -> &'static str {
-    let closed = a.topology().is_some_and(|found| found.half_edges.iter().all(|edge| edge.twin != u32::MAX));
-    match (from_surface(a, point), closed) {
+    match (from_surface(a, point), is_closed(a)) {
         (0.0, _) => "on",
         (_, false) => "undefined",
         _ if a.contains_local_point(point) => "inside",
@@ -140,9 +199,16 @@ fn found(answer: Result<impl Into<Value>, Unsupported>) -> Result<Value, String>
     answer.map(|answer| json!({ "answer": answer.into() })).map_err(|reason| reason.to_string())
 }
 
-fn answer(question: &Value, meshes: &HashMap<String, TriMesh>) -> Result<Value, String> {
+fn answer(
+    question: &Value,
+    meshes: &HashMap<String, TriMesh>,
+    sets: &HashMap<String, Vec<Ray>>,
+) -> Result<Value, String> {
     let mesh = |key: &str| meshes.get(question[key].as_str().unwrap_or("")).ok_or("a mesh was refused");
     let a = mesh("a")?;
+    if let Some(name) = question["probes"].as_str() {
+        return probed(question, a, sets.get(name).ok_or("expected the name of a set")?);
+    }
     if question.get("poses").is_some() {
         return timed(question, a, mesh("b")?);
     }
@@ -168,7 +234,7 @@ fn answer(question: &Value, meshes: &HashMap<String, TriMesh>) -> Result<Value, 
 }
 
 fn main() {
-    let mut meshes = HashMap::new();
+    let (mut meshes, mut sets) = (HashMap::new(), HashMap::new());
     for line in stdin().lock().lines() {
         let message: Value = serde_json::from_str(&line.expect("a line")).expect("JSON");
         let mut reply = json!({});
@@ -176,7 +242,7 @@ fn main() {
             Ok(json!({
                 "hello": 1, "name": "parry3d", "version": "0.31.1", "settings": "parry3d-f64, TriMesh, ORIENTED",
                 "questions": ["collide", "distance", "contacts", "closest", "side", "ray", "segment"],
-                "timed": ["collide", "distance"], "coordinates": "f64", "placement": "f64", "features": ["open", "concave", "nested", "degenerate", "range"],
+                "timed": ["collide", "distance", "ray", "hit", "closest", "side"], "coordinates": "f64", "placement": "f64", "features": ["open", "concave", "nested", "degenerate", "range"],
                 "distance_error": 1e-6, "error_unit": "size",
             }))
         } else if let Some(name) = message["mesh"].as_str() {
@@ -189,9 +255,16 @@ fn main() {
                 meshes.insert(name.to_owned(), mesh);
                 cost
             })
+        } else if let (Some(name), true) = (message["probes"].as_str(), message.get("file").is_some()) {
+            reply["probes"] = json!(name);
+            set_of_file(&message).map(|set| {
+                let count = set.len();
+                sets.insert(name.to_owned(), set);
+                json!({ "count": count })
+            })
         } else {
             reply["id"] = message["id"].clone();
-            answer(&message, &meshes)
+            answer(&message, &meshes, &sets)
         };
         let found = found.unwrap_or_else(|reason| json!({ "refused": true, "reason": reason }));
         reply.as_object_mut().expect("an object").extend(found.as_object().expect("an object").clone());
