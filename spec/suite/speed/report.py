@@ -19,7 +19,7 @@ from math import ceil, log10
 from pathlib import Path
 from statistics import median
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b", "#bcbd22", "#17becf", "#000000")
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b", "#bcbd22", "#17becf", "#000000", "#f781bf")
 PRESETS = ("deep", "touching", "0.0001%", "0.5%", "1%", "5%", "10%", "far")
 QUESTIONS = {
     "collide": "Do the two touch?",
@@ -318,6 +318,7 @@ def plot(title, labels, lines, x_title, colours):
 
 def plots(cells, names):
     """Returns the plots by the names of their files: for each question and pair over the presets, and over the size of the meshes."""
+    names = [name for name in names if any(name in row for row in cells.values())]
     found, colours = {}, {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(names)}
 
     def add(file, title, keys, labels, x_title):
@@ -378,7 +379,9 @@ def page(head, builds, batches, failed, cells, probed, subject, drawn, folder, r
         lines += probed_lines(builds, probed, list(head["runners"]), subject)
     if wrong:
         lines += ["", "## Wrong answers", "", *wrong_table(cells)]
-    lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together; a mesh of rays and points by itself. Bytes are the growth of resident memory, or of the library's file where it maps one.", "", *build_table(builds, subject)]
+    starts = head.get("starts", 1)
+    often = f" Costs are those of the median of {starts} builds." if starts > 1 else ""
+    lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together; a mesh of rays and points by itself. Bytes are the growth of resident memory, or of the library's file where it maps one." + often, "", *build_table(builds, subject)]
     if batches:
         lines += ["", "## Many poses in one call, on all cores", "", "The time per query, by question and gap.", "", *batch_table(batches)]
     if failed:

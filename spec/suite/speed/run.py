@@ -176,7 +176,7 @@ class Measurement:
         size = {preset: max(max(abs(x) for x in pose) for pose, _ in found) for preset, found in items.items()}
         largest = max(float(np.abs(corners).max()) for corners, _ in made.values())
         size = {preset: max(largest, of) for preset, of in size.items()}
-        ready = [runner for runner in able if self.attempt(runner, name, self.prepare, runner, name, made, a, field, folder, items)]
+        ready = [runner for runner in able if self.attempt(runner, name, self.started, runner, self.prepare, name, made, a, field, folder, items)]
         ready = self.asked_more(ready)
         for number in range(1 + self.arguments.rounds):
             for what, presets in ASKED.items():
@@ -211,14 +211,26 @@ class Measurement:
             self.write({"runner": runner.name, "pair": name, "failed": f"{type(failure).__name__} {failure}".strip()})
             return False
 
+    def started(self, runner, prepare, *arguments):
+        """Starts a runner some times, of which the last stays, writes the costs that are the median of builds, and tells whether the runner takes part."""
+        records = []
+        for _ in range(self.arguments.starts):
+            runner.start()
+            record = prepare(runner, *arguments)
+            if record is None:
+                return False
+            records.append(record)
+        records.sort(key=lambda record: sum(cost["seconds"] for cost in record["meshes"].values()))
+        self.write(records[len(records) // 2])
+        return True
+
     def prepare(self, runner, name, made, a, field, folder, items):
-        """Starts a runner, sends the meshes, asks the first question, and tells whether the runner takes part."""
-        runner.start()
+        """Sends the meshes and asks the first question. Returns what that cost, or None if the runner does not take part."""
         record = {"runner": runner.name, "pair": name, "triangles": {mesh: len(faces) for mesh, (_, faces) in made.items()}, "meshes": {}}
         for mesh, (corners, faces) in made.items():
             cost = self.send_mesh(runner, mesh, corners, faces, folder)
             if cost is None:
-                return False
+                return None
             record["meshes"][mesh] = cost
         if field:
             numbers, rows = forms.instances(field)
@@ -226,8 +238,7 @@ class Measurement:
             record["field_seconds"] = runner.send("field", sent)["seconds"]
         b = forms.catalogue()["pairs"][name][1]
         found = runner.ask(FIRST[0], a, b, items[FIRST[1]][:1], self.arguments.budget) if FIRST[0] in runner.profile["timed"] else None
-        self.write(record | {"first_nanoseconds": found["nanoseconds"][0] if found else None})
-        return True
+        return record | {"first_nanoseconds": found["nanoseconds"][0] if found else None}
 
     @staticmethod
     def send_mesh(runner, mesh, corners, faces, folder):
@@ -290,7 +301,7 @@ class Measurement:
         count = SMOKE_PROBES if self.arguments.smoke else probes.COUNT
         sets = {kind: (of[:count], facts[: len(range(0, count, probes.STEP))]) for kind, (of, facts) in probes.load(mesh).items()}
         able = [runner for runner in self.runners if set(PROBED) & {*self.profile_of(runner)["timed"], *runner.profile.get("batch", ())}]
-        ready = [runner for runner in able if self.attempt(runner, name, self.prepare_probes, runner, name, mesh, corners, faces, sets, folder)]
+        ready = [runner for runner in able if self.attempt(runner, name, self.started, runner, self.prepare_probes, name, mesh, corners, faces, sets, folder)]
         ready = self.asked_more(ready)
         cells, size = {}, float(np.abs(corners).max())
         for number in range(1 + self.arguments.rounds):
@@ -312,19 +323,17 @@ class Measurement:
                 self.write({"runner": runner, "mesh": mesh, "probe": what, "kind": kind, "batch": is_batch, "count": cell.count, "checked": cell.checked, "threads": cell.threads, **cell.record()})
 
     def prepare_probes(self, runner, name, mesh, corners, faces, sets, folder):
-        """Starts a runner, sends the mesh and the rays and points, asks about one ray, and tells whether the runner takes part."""
-        runner.start()
+        """Sends the mesh and the rays and points, and asks about one ray. Returns what that cost, or None if the runner does not take part."""
         cost = self.send_mesh(runner, mesh, corners, faces, folder)
         if cost is None:
-            return False
+            return None
         for kind, (of, _) in sets.items():
             file = folder / f"{mesh}-{kind}.probes"
             file.write_bytes(of.astype("<f4").tobytes())
             runner.send("probes", {"probes": kind, "file": str(file), "count": len(of), "numbers": of.shape[1]})
         # A budget of nothing is enough for one ray.
         first = runner.put({"ask": "ray", "a": mesh, "probes": "camera", "budget": 0.0}, len(sets["camera"][0])) if "ray" in runner.profile["timed"] else None
-        self.write({"runner": runner.name, "pair": name, "triangles": {mesh: len(faces)}, "meshes": {mesh: cost}, "first_nanoseconds": first["nanoseconds"][0] if first else None})
-        return True
+        return {"runner": runner.name, "pair": name, "triangles": {mesh: len(faces)}, "meshes": {mesh: cost}, "first_nanoseconds": first["nanoseconds"][0] if first else None}
 
     def probe(self, runner, mesh, what, kind, is_batch, of, facts, size, cell):
         """Asks one runner one question about a set. Of a batch that takes longer than the budget, there are two rounds."""
@@ -381,13 +390,14 @@ def main(argv=None):
     parser.add_argument("--bin", default="target/speed/bin", help="the folder of the runners that setup has built")
     parser.add_argument("--only", default="", help="only pairs with one of these texts in their name, separated by commas; rays and points of a mesh are probes/MESH")
     parser.add_argument("--rounds", type=int, default=5, help="rounds after the first, which counts as cold")
+    parser.add_argument("--starts", type=int, default=3, help="starts of each runner for each pair or mesh; the costs of builds are those of the median")
     parser.add_argument("--sample", type=int, default=1, metavar="N", help="every Nth pose")
     parser.add_argument("--budget", type=float, default=1.0, help="seconds after which a round of one question begins no other pose")
     parser.add_argument("--core", type=int, help="the core to which runners are pinned, where there is taskset")
     parser.add_argument("--smoke", action="store_true", help="few poses of small pairs: does everything work?")
     arguments = parser.parse_args(argv)
     if arguments.smoke:
-        arguments.rounds, arguments.sample, arguments.only = 1, 10, ",".join(SMOKE)
+        arguments.rounds, arguments.starts, arguments.sample, arguments.only = 1, 1, 10, ",".join(SMOKE)
     runners = chosen_runners(arguments)
     arguments.out.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
@@ -396,7 +406,7 @@ def main(argv=None):
         try:
             profiles = {runner.name: {key: measurement.profile_of(runner).get(key) for key in ("name", "version", "settings")} for runner in runners}
             suite = (SUITE / "VERSION").read_text(encoding="utf-8").strip()
-            measurement.write({"date": str(datetime.date.today()), "processor": machine(), "system": platform.system(), "pinned": arguments.core is not None, "rounds": arguments.rounds, "suite": suite, "runners": profiles})
+            measurement.write({"date": str(datetime.date.today()), "processor": machine(), "system": platform.system(), "pinned": arguments.core is not None, "rounds": arguments.rounds, "starts": arguments.starts, "suite": suite, "runners": profiles})
             asked = {name: [measurement.pair, measurement.batches] for name in forms.catalogue()["pairs"]}
             asked |= {f"probes/{mesh}": [lambda name, folder, mesh=mesh: measurement.probes(name, mesh, folder)] for mesh in probes.MESHES}
             for name, measure in asked.items():

@@ -228,7 +228,7 @@ class Runs(unittest.TestCase):
 
 class Reports(unittest.TestCase):
     def test_losses_come_first_and_wrong_answers_do_not_win(self):
-        head = {"date": "2026-01-01", "processor": "P", "system": "S", "pinned": True, "rounds": 2, "suite": "1", "runners": {n: {"version": "1", "settings": "s"} for n in ("cbvh", "cbvh, quick", "x", "y")}}
+        head = {"date": "2026-01-01", "processor": "P", "system": "S", "pinned": True, "rounds": 2, "starts": 3, "suite": "1", "runners": {n: {"version": "1", "settings": "s"} for n in ("cbvh", "cbvh, quick", "x", "y")}}
         costs = lambda seconds: {"meshes": {"m": {"seconds": seconds, "open_seconds": None, "bytes": 1000}}, "first_nanoseconds": 5000, "triangles": {"m": 10}}
         lines = [head, {"runner": "cbvh", "pair": "p", **costs(0.2)}, {"runner": "cbvh, quick", "pair": "p", **costs(0.05)}, {"runner": "x", "pair": "p", **costs(0.1)}]
         for name, nanoseconds, wrong in (("cbvh", 2000, []), ("x", 1000, []), ("y", 10, [1])):
@@ -248,6 +248,7 @@ class Reports(unittest.TestCase):
         self.assertIn("| pair | 1% |\n|---|---|\n| p | 0.5 |", page)
         self.assertIn("| y | collide | p | 1% | 1 of 2 |", page)
         self.assertIn("| p | 200 | 100, x | 100 | 100, x |", page)
+        self.assertIn("Costs are those of the median of 3 builds.", page)
         self.assertIn("| p, quick | 50 | 100, x | 100 | 100, x |", page)
         self.assertIn("|---|---|---|---|---|---|---|---|\n| p | cbvh | 200 | 100, x | 2.00 | 200 | 100, x | 2.00 |\n\n", page)
         self.assertIn("In 1 of 2 comparisons of rays and points", page)
