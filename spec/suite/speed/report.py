@@ -267,8 +267,9 @@ def probed_table(probed, question, is_batch, names, subject):
 def probed_lines(builds, probed, names, subject):
     """Returns the section about rays and points."""
     checked = max(cell.checked for row in probed.values() for cell in row.values())
-    lines = ["", "## Rays and points", "", "Nanoseconds for each ray or point, on the same core, one by one or in one call. *best other* is the fastest other library that is right. Libraries in Python",
-             f"are asked in one call only, because a call from Python costs more than an answer. Of each kind, {checked:,} answers are checked."]  # fmt: skip
+    lines = ["", "## Rays and points", "", "Nanoseconds for each ray or point, on the same core: one by one the median over them, in one call the mean, which is larger where some answers take",
+             "long. *best other* is the fastest other library that is right. Libraries in Python are asked in one call only, because a call from Python costs",
+             f"more than an answer. Of each kind, {checked:,} answers are checked."]  # fmt: skip
     for question, title in PROBED.items():
         if any(key[0] == question for key in probed):
             lines += ["", f"### {title} (`{question}`)"]
