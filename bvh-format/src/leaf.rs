@@ -110,7 +110,14 @@ impl Packet {
     /// The three corners of the triangle in a lane.
     #[inline]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
-        [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| self.corners[corner][axis][lane]))
+        let mut triangle = [[0.0; 3]; 3];
+        // Not by nested `map`, which compilers may call instead of writing it out.
+        for corner in 0..3 {
+            for axis in 0..3 {
+                triangle[corner][axis] = self.corners[corner][axis][lane];
+            }
+        }
+        triangle
     }
 }
 

@@ -81,7 +81,21 @@ impl Ray {
     /// or point that its corners span.
     #[inline(always)]
     pub(crate) fn crossing(&self, triangle: &Triangle) -> Option<Crossing> {
-        let seen = triangle.map(|corner| subtract(corner, self.origin));
+        self.crossing_within(triangle, DOUBT)
+    }
+
+    /// Returns whether the ray meets a triangle up to a limit of its parameter. The decision is that of [`Ray::crossing`] and
+    /// [`Ray::is_within`], which need not know the parameter well.
+    #[inline(always)]
+    pub(crate) fn meets(&self, triangle: &Triangle, limit: f64) -> bool {
+        let crossing = self.crossing_within(triangle, f64::INFINITY);
+        crossing.is_some_and(|crossing| self.is_within(triangle, &crossing, limit))
+    }
+
+    /// Does what `crossing` does, where so much of the parameter may be in doubt.
+    #[inline(always)]
+    fn crossing_within(&self, triangle: &Triangle, doubt: f64) -> Option<Crossing> {
+        let seen = self.seen(triangle);
         let mut sides = [0.0; 3];
         for i in 0..3 {
             sides[i] = self.side(triangle, &seen, i);
@@ -94,7 +108,13 @@ impl Ray {
         if !positive && !negative {
             return self.crossing_in_plane(triangle);
         }
-        self.crossing_of_plane(triangle, &seen, positive, feature(triangle, sides))
+        self.crossing_of_plane(triangle, &seen, (positive, doubt), feature(triangle, sides))
+    }
+
+    /// Returns a triangle as the origin sees it, but for roundings.
+    #[inline(always)]
+    fn seen(&self, &[a, b, c]: &Triangle) -> Triangle {
+        [subtract(a, self.origin), subtract(b, self.origin), subtract(c, self.origin)]
     }
 
     /// Returns a number with the exact sign of the side on which the line passes edge `i`.
@@ -130,7 +150,7 @@ impl Ray {
         &self,
         triangle: &Triangle,
         seen: &Triangle,
-        forwards: bool,
+        (forwards, doubt): (bool, f64),
         feature: Feature,
     ) -> Option<Crossing> {
         let (u, v) = (subtract(triangle[1], triangle[0]), subtract(triangle[2], triangle[0]));
@@ -145,7 +165,7 @@ impl Ray {
         // Each quotient is within three roundings of what it bounds, and its product takes one more.
         let lower = (height - height_error) / (slope + slope_error) * (1.0 - 8.0 * UNIT_ROUNDOFF);
         let upper = (height + height_error) / (slope - slope_error) * (1.0 + 8.0 * UNIT_ROUNDOFF);
-        if slope > slope_error && lower > 0.0 && upper - lower <= DOUBT * upper {
+        if slope > slope_error && lower > 0.0 && upper - lower <= doubt * upper {
             let t = (height / slope).max(lower).min(upper);
             return Some(Crossing { t, lower, upper, feature });
         }
@@ -235,7 +255,7 @@ impl Ray {
         if crossing.upper == 0.0 {
             return Quotient { numerator: BigInt::ZERO, denominator: 1.into() };
         }
-        let seen = triangle.map(|corner| subtract(corner, self.origin));
+        let seen = self.seen(triangle);
         if (0..3).any(|i| self.side(triangle, &seen, i) != 0.0) {
             return self.parameter_of_plane(triangle);
         }
@@ -263,7 +283,8 @@ fn feature(triangle: &Triangle, sides: [f64; 3]) -> Feature {
 /// Returns the permanent of three vectors: the product of the first with the minors of the others, all terms positive.
 #[inline(always)]
 fn permanent(w: Point, u: Point, v: Point) -> f64 {
-    let (w, u, v) = (w.map(f64::abs), u.map(f64::abs), v.map(f64::abs));
+    let magnitudes = |[x, y, z]: Point| [x.abs(), y.abs(), z.abs()];
+    let (w, u, v) = (magnitudes(w), magnitudes(u), magnitudes(v));
     dot(w, [u[1] * v[2] + u[2] * v[1], u[2] * v[0] + u[0] * v[2], u[0] * v[1] + u[1] * v[0]])
 }
 

@@ -248,8 +248,13 @@ impl RayVisitor for AlongTree<'_> {
             let leaf = places.packet(place, triangles);
             let vertices = of.object.vertices();
             let triangle: Triangle = if vertices.are_sums() {
-                let offsets = packet.triangle(lane.into());
-                offsets.map(|v| [0, 1, 2].map(|axis| vertices.origin[axis] + f64::from(v[axis])))
+                let (offsets, mut triangle) = (packet.triangle(lane.into()), [[0.0; 3]; 3]);
+                for corner in 0..3 {
+                    for axis in 0..3 {
+                        triangle[corner][axis] = vertices.origin[axis] + f64::from(offsets[corner][axis]);
+                    }
+                }
+                triangle
             } else {
                 of.bvh.vertices(of.object, leaf, lane)?
             };

@@ -72,10 +72,19 @@ impl IntoObject {
     #[inline(always)]
     pub(crate) fn new(pose: Option<&Pose>, object: &Object) -> Self {
         let (record, origin) = (object.record(), object.origin());
-        let bounds = [record.box_lo, record.box_hi].map(|corner| corner.map(|v| f64::from(v.get())));
+        let mut bounds = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            bounds[0][axis] = f64::from(record.box_lo[axis].get());
+            bounds[1][axis] = f64::from(record.box_hi[axis].get());
+        }
         let translation = pose.map_or([0.0; 3], |pose| pose.translation());
-        let magnitude =
-            [origin, bounds[0], bounds[1], translation].as_flattened().iter().map(|v| v.abs()).sum();
+        let mut sums = [0.0; 3];
+        for axis in 0..3 {
+            sums[axis] = origin[axis].abs()
+                + bounds[0][axis].abs()
+                + (bounds[1][axis].abs() + translation[axis].abs());
+        }
+        let magnitude = sums[0] + sums[1] + sums[2];
         let side = |k: usize| bounds[1][k] - bounds[0][k];
         let size = side(0).max(side(1)).max(side(2));
         let (rotation, left_out) = (pose.map(|pose| inverse(pose.rotation())), object.volumes().left_out);

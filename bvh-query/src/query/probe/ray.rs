@@ -162,6 +162,15 @@ impl Scaled {
         self.ray.crossing(triangle).filter(|crossing| self.ray.is_within(triangle, crossing, self.until))
     }
 
+    /// Returns whether it meets a triangle within its length.
+    #[inline(always)]
+    fn meets(&self, candidate: &Candidate<'_>) -> bool {
+        match candidate.radius > 0.0 {
+            true => self.crossing(candidate).is_some(),
+            false => self.ray.meets(&candidate.triangle, self.until),
+        }
+    }
+
     /// Returns a hit as an answer, and the number of its instance.
     fn hit(&self, met: &Met) -> (u32, RayHit) {
         let narrow::Ray { origin, direction } = self.ray;
@@ -310,7 +319,7 @@ impl LineQuestion for Any {
     }
 
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
-        self.found |= self.ray.crossing(candidate).is_some();
+        self.found |= self.ray.meets(candidate);
         Ok(())
     }
 }
