@@ -92,6 +92,11 @@ def table(names, rows):
     return lines + ["| " + " | ".join(row) + " |" for row in rows]
 
 
+def marked(name, lines):
+    """Returns lines that the book includes by their name."""
+    return [f"<!-- ANCHOR: {name} -->", *lines, f"<!-- ANCHOR_END: {name} -->"]
+
+
 def is_own(name, subject):
     """Tells whether a runner is the subject, or the subject with other options."""
     return name == subject or name.startswith(subject + ", ")
@@ -347,29 +352,29 @@ def page(head, builds, batches, failed, cells, probed, subject, drawn, folder, r
     where = f"on one {'pinned ' if head['pinned'] else ''}core of {head['processor']}, {head['system']}"
     plotted = lambda wanted: [f"![{file[:-4]}]({folder}{file})" for file in drawn if wanted(file)]
     of_size = lambda file: file.endswith("-scaling.svg")
-    lines = ["# Speed", "", f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}.", "",
+    lines = ["# Speed", "", *marked("made", [f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}."]), "",
              "Times are medians over the poses, in microseconds. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away, where",
              f"`collide` shows the cost of a call. By the proofs, {wrong + probed_wrong or 'no'} answers are wrong, counted once for each pose, ray and point. A library with a wrong answer in a cell",
              f"is not counted as best there. [queries.csv]({folder}queries.csv)"
              + (f", [probes.csv]({folder}probes.csv)" if probed else "")
              + f" and [builds.csv]({folder}builds.csv) have all times.", f"[What is timed]({readme})", "",
-             *(["## In short", "", *summary(builds, cells, subject), ""] if cells else [])]  # fmt: skip
+             *(["## In short", "", *marked("short", summary(builds, cells, subject)), ""] if cells else [])]  # fmt: skip
     if sizes := plotted(of_size):
         lines += [*sizes, ""]
     lines += [f"## Where {subject} loses", ""]
+    told = [f"No other library is faster in any of {compared} comparisons of queries."]
     if lost:
-        lines += [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
-    else:
-        lines.append(f"No other library is faster in any of {compared} comparisons of queries.")
+        told = [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
     if probed:
         if lost := probed_losses(probed, subject):
-            lines += ["", f"In {len(lost)} of {probed_compared} comparisons of rays and points, another library is faster, in nanoseconds:", ""]
-            lines += table(["question", "mesh", "kind", subject, "faster", "its time", "times as fast"], lost)
+            told += ["", f"In {len(lost)} of {probed_compared} comparisons of rays and points, another library is faster, in nanoseconds:", ""]
+            told += table(["question", "mesh", "kind", subject, "faster", "its time", "times as fast"], lost)
         else:
-            lines += ["", f"No other library is faster in any of {probed_compared} comparisons of rays and points."]
+            told += ["", f"No other library is faster in any of {probed_compared} comparisons of rays and points."]
     if lost := lost_builds(builds, subject):
-        lines += ["", "Other libraries build faster, or give the first answer from the mesh sooner, build included:", ""]
-        lines += table(["pair", "options", *(head for name in FIRST_COSTS for head in (name, "faster", "times as fast"))], lost)
+        told += ["", "Other libraries build faster, or give the first answer from the mesh sooner, build included:", ""]
+        told += table(["pair", "options", *(head for name in FIRST_COSTS for head in (name, "faster", "times as fast"))], lost)
+    lines += marked("losses", told)
     lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes that answers correctly."]
     for question, title in QUESTIONS.items():
         if any(key[0] == question for key in cells):
