@@ -30,3 +30,11 @@ pub type Triangle = [[f64; 3]; 3];
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
+
+/// Compiles the Rust blocks of the book. `spec/book/check.py` checks those of other languages.
+#[cfg(doctest)]
+#[doc = include_str!("../../../spec/book/src/start/rust.md")]
+#[doc = include_str!("../../../spec/book/src/guide/baking.md")]
+#[doc = include_str!("../../../spec/book/src/guide/points-and-rays.md")]
+#[doc = include_str!("../../../spec/book/src/guide/shapes.md")]
+struct Book;
