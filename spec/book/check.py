@@ -1,8 +1,9 @@
 """Checks documents: links and anchors of all Markdown files of the repository, and the blocks of the book that are commands.
 
-    check.py links                  every relative link leads to a file and an anchor; the book's pages are all listed
+    check.py links                  every relative link leads to a file and an anchor; the book's pages are all listed, and show
+                                    programs of the repository as they are
     check.py commands CBVH [PAGE]   runs the shell blocks of the book with this command, and compares their output
-    check.py programs FOLDER...     runs the example programs that pages include, from these folders, and compares their output
+    check.py programs FOLDER...     runs the example programs that pages show, from these folders, and compares their output
     check.py site FOLDER            every link of the pages that mdBook wrote there leads to a file
     check.py words                  prints the number of words of each page
 
@@ -21,7 +22,6 @@ import urllib.parse
 
 import pages
 
-PROGRAM = re.compile(r"^\{\{#include (\S*/(?:examples|consumer)/)(\w+)\.(rs|c|cpp|mjs)(?::\w+)?\}\}$")
 
 
 def expected(shown: str, found: str) -> bool:
@@ -119,31 +119,51 @@ def check_commands(command: str, page: str = "") -> list[str]:
     return wrong
 
 
+def shown_file(block: pages.Block) -> pathlib.Path | None:
+    """The file of the repository that a block shows, as its word `file=PATH` says."""
+    files = [word.removeprefix("file=") for word in block.words if word.startswith("file=")]
+    return pages.ROOT / files[0] if files else None
+
+
+def check_files() -> list[str]:
+    """Blocks that show a file, or the part of it between the lines ANCHOR and ANCHOR_END, have its text."""
+    wrong = []
+    for path in pages.chapters():
+        for block, _ in pairs(path):
+            file = shown_file(block)
+            if file is None:
+                continue
+            text = file.read_text(encoding="utf-8") if file.exists() else ""
+            if "// ANCHOR: program\n" in text:
+                text = text.split("// ANCHOR: program\n")[1].split("// ANCHOR_END: program\n")[0]
+            if block.text != text:
+                wrong.append(f"{name(path)}:{block.line}: expected the text of {name(file)}")
+    return wrong
+
+
 def check_programs(folders: list[str]) -> list[str]:
-    """Of all included programs, those that are in these folders: programs of Rust and of C are built apart."""
+    """Of all programs that pages show, those that are in these folders: programs of each language are built apart."""
     wrong, count = [], 0
     for path in pages.chapters():
         for block, shown in pairs(path):
-            found = PROGRAM.match(block.text.strip())
-            if found is None:
-                continue
-            source = (path.parent / found[1] / f"{found[2]}.{found[3]}").resolve()
-            if not source.exists():
-                wrong.append(f"{name(path)}:{block.line}: no file {source}")
+            file = shown_file(block)
+            if file is None:
                 continue
             for folder in folders:
-                program = pathlib.Path(folder).resolve() / (f"{found[2]}.mjs" if found[3] == "mjs" else found[2])
-                if (found[3] == "rs") != (program.parent.name == "examples") or not program.exists():
+                program = pathlib.Path(folder).resolve() / (file.name if file.suffix == ".mjs" else file.stem)
+                if (file.suffix == ".rs") != (program.parent.name == "examples") or not program.exists():
                     continue
-                command = ["node", program] if found[3] == "mjs" else [program]
+                command = ["node", program] if file.suffix == ".mjs" else [program]
                 count += 1
                 with tempfile.TemporaryDirectory() as place:
                     os.symlink(pages.ROOT / "testdata", os.path.join(place, "testdata"))
-                    ended = subprocess.run(command, cwd=place, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+                    ended = subprocess.run(
+                        command, cwd=place, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300
+                    )
                 if ended.returncode != 0 or shown is None or not expected(shown, ended.stdout):
                     wrong.append(f"{name(path)}:{block.line}: expected\n{shown}found\n{ended.stdout}{ended.stderr}")
     if count == 0:
-        wrong.append("expected programs that pages include, found none")
+        wrong.append("expected programs that pages show, found none")
     print(f"{count} programs")
     return wrong
 
@@ -175,7 +195,7 @@ def count_words() -> list[str]:
 def main() -> int:
     match sys.argv[1:]:
         case ["links"]:
-            wrong = check_links()
+            wrong = check_links() + check_files()
         case ["commands", command, *page] if len(page) < 2:
             wrong = check_commands(command, *page)
         case ["programs", *folders] if folders:

@@ -26,8 +26,7 @@ def main() -> None:
     parts = [HEAD]
     for path in check.pages.chapters():
         for block, _ in check.pairs(path):
-            is_program = check.PROGRAM.match(block.text.strip()) or "int main(" in block.text
-            if block.language in ("c", "cpp") and "ignore" not in block.words and not is_program:
+            if block.language in ("c", "cpp") and "ignore" not in block.words and check.shown_file(block) is None:
                 parts.append(f'void block_{len(parts)}() {{\n#line {block.line + 1} "{check.name(path)}"\n{block.text}}}\n')
     assert len(parts) > 2, "expected more blocks of C++"
     pathlib.Path(sys.argv[1]).write_text("".join(parts), encoding="utf-8")
