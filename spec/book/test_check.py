@@ -1,0 +1,67 @@
+"""Tests how documents are read, and that the checks find what they are for."""
+
+import pathlib
+import unittest
+
+import check
+import pages
+import preprocess
+
+PAGE = """# A page, with `code` and a [link](there.md#part)
+
+Text with ![a picture](picture.png "Title") and `[no](link.md)`.
+
+```sh,ignore
+[no](link.md)
+```
+
+## Again
+
+```text
+one
+```
+
+## Again
+
+<a id="own"></a>
+"""
+
+
+class Documents(unittest.TestCase):
+    def test_links_are_those_of_the_prose(self):
+        self.assertEqual(list(pages.links(PAGE)), [(1, "there.md#part"), (3, "picture.png")])
+
+    def test_anchors_are_those_of_headings_and_marks(self):
+        self.assertEqual(pages.anchors(PAGE), {"a-page-with-code-and-a-link", "again", "again-1", "own"})
+
+    def test_blocks_have_a_language_and_words(self):
+        found = [(block.language, block.words, block.line) for block in pages.blocks(PAGE)]
+        self.assertEqual(found, [("sh", ["ignore"], 5), ("text", [], 11)])
+
+    def test_an_ellipsis_stands_for_characters_or_lines(self):
+        self.assertTrue(check.expected("took …\n", "took 0.1 s\n"))
+        self.assertTrue(check.expected("a\n…\nb\n", "a\nc\nd\nb\n"))
+        self.assertTrue(check.expected("a\n…\n", "a\n"))
+        self.assertFalse(check.expected("took …\n", "took 1\nand more\n"))
+        self.assertFalse(check.expected("1.5\n", "1x5\n"))
+        self.assertFalse(check.expected("a\n", "a\nb\n"))
+
+    def test_links_of_included_documents_lead_to_chapters_or_files(self):
+        glossary, chapter = pages.ROOT / "spec/glossary.md", pages.SOURCES / "reference/glossary.md"
+        here, output = pages.SOURCES / "format/versions.md", pages.ROOT / "target/book"
+
+        def led(text, address=None):
+            return preprocess.led(text, pages.ROOT / "spec", here, {glossary: chapter}, address, output)
+
+        self.assertEqual(led("[terms](glossary.md#slab)"), "[terms](../reference/glossary.md#slab)")
+        self.assertEqual(led("[c](reader/check.py)"), "[c](../../../spec/reader/check.py)")
+        self.assertEqual(led("[s](suite/README.md)", "https://x.example/tree"), "[s](https://x.example/tree/spec/suite/README%2Emd)")
+        self.assertEqual(led("`[a](b.md)` [w](https://x.example) [h](#part)"), "`[a](b.md)` [w](https://x.example) [h](#part)")
+
+    def test_all_chapters_are_there(self):
+        self.assertGreater(len(pages.chapters()), 30)
+        self.assertTrue(all(isinstance(path, pathlib.Path) and path.exists() for path in pages.chapters()))
+
+
+if __name__ == "__main__":
+    unittest.main()
