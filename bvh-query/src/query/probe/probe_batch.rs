@@ -216,7 +216,7 @@ impl<'a> ProbeBatch<'a> {
         ask: impl Fn(&mut Querier, &mut dyn Iterator<Item = usize>, &mut Run<R>) + Sync,
     ) -> Result<Vec<R>, QueryError> {
         let number = |place: usize| order.map_or(place, |order| order[place] as usize);
-        let mut answers: Vec<Option<R>> = Vec::new();
+        let mut answers: Vec<Option<R>> = Vec::with_capacity(count);
         if order.is_some() {
             answers.resize_with(count, || None);
         }
