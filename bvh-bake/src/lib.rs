@@ -46,6 +46,7 @@
 //! No input makes a bake panic: every error names the file, the place, what was expected and what was found. Equal
 //! meshes and options give equal bytes. A vertex that an `f32` relative to the origin cannot represent is moved, and
 //! the file states the largest such move.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
 mod bake;

@@ -29,8 +29,8 @@
 //! whether two meshes touch, how far apart they are and whether they are within a distance in less time, for poses that
 //! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
 //! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
-//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the feature `trace`
-//! is for tools: it records which nodes and packets a question visits. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
+//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`]. Features whose names begin with `__` are
+//! not part of the public interface. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
 //! the world, in the world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
 //! A query about two meshes walks both trees together, and one about a point or a line walks one tree. Nodes and triangles
@@ -75,6 +75,7 @@
 //! # Ok(())
 //! # }
 //! ```
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![deny(unsafe_code)]
 
 mod error;
@@ -154,8 +155,9 @@ macro_rules! include_cbvh {
 #[derive(Debug)]
 pub struct Embedded<B: ?Sized>(pub B);
 
-/// What a question visits.
-#[cfg(feature = "trace")]
+/// What a question visits, for the page of `cbvh view` alone.
+#[doc(hidden)]
+#[cfg(feature = "__trace")]
 pub mod trace {
     pub use crate::traverse::trace::{Step, record};
 }

@@ -6,11 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The sources of all crates, beside the repository's root.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "bvh-format/src",
     "bvh-bake/src",
     "bvh-query/cli/src",
     "bvh-query/src",
+    "bvh-query/cbvh/src",
     "bvh-query/robot/src",
     "bvh-query/view/src",
     "bvh-query/python/src",

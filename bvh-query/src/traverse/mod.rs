@@ -21,7 +21,7 @@ pub(crate) mod ray_build;
 pub(crate) mod ray_walk;
 pub(crate) mod slab_filter;
 pub(crate) mod slab_memory;
-#[cfg(feature = "trace")]
+#[cfg(feature = "__trace")]
 pub(crate) mod trace;
 pub(crate) mod walk;
 pub(crate) mod walk_memory;

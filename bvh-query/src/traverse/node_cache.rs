@@ -152,7 +152,7 @@ impl NodeCache {
     }
 
     /// Returns the first number of a child's node, and the child's place among all children of the node.
-    #[cfg(feature = "trace")]
+    #[cfg(feature = "__trace")]
     pub(crate) fn place_in_treelet(&self, at: ChildRef) -> (usize, usize) {
         let place = self.nodes[at.node()].place(at);
         (at.node() - place / 4, place)

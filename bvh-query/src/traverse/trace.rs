@@ -1,4 +1,4 @@
-//! Records what the walks of two trees meet, for tools that show the work of a query. Needs the feature `trace`.
+//! Records what the walks of two trees meet, for tools that show the work of a query. Needs the feature `__trace`.
 //!
 //! Nodes are numbered as the walk numbers them: `Step::Objects` gives the number of the node that has an object's root as its only
 //! child, and `Step::Opened` that of each opened node, until the next `Step::Objects`. The pages of the file tell what the

@@ -30,7 +30,7 @@ use crate::traverse::pending::{Entry, PendingTests};
 use crate::traverse::per_node::PerWalk;
 use crate::traverse::placement::ObjectPair;
 use crate::traverse::slab_memory::{SlabMemory, TestSlabs};
-#[cfg(feature = "trace")]
+#[cfg(feature = "__trace")]
 use crate::traverse::trace;
 use bvh_format::slabs::Group;
 use std::ops::ControlFlow;
@@ -316,7 +316,7 @@ impl PairMemory {
         // If it takes the place of A's, the node above A's is there as before.
         let root_b = self.nodes.root(isa, pair.bvh_b, pair.object_b)?;
         self.roots = (root_a, root_b);
-        #[cfg(feature = "trace")]
+        #[cfg(feature = "__trace")]
         trace::objects(pair, [root_a.node, root_b.node]);
         self.left = (max_nodes(pair.object_a), max_nodes(pair.object_b));
         self.aligned_a.start();
@@ -440,7 +440,7 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         leaves: (LeafPacket, LeafPacket),
         at_once: bool,
     ) -> Result<ControlFlow<()>, QueryError> {
-        #[cfg(feature = "trace")]
+        #[cfg(feature = "__trace")]
         trace::packets(leaves);
         let flow = isa.run(VisitLeaves { visitor: &mut *self.visitor, leaves, at_once })?;
         self.follow_visitor();
@@ -491,13 +491,13 @@ impl<W: Visitor> PairWalk<'_, '_, W> {
         // One branch each, as far as a processor can predict any.
         if !a.is_leaf() & (b.is_leaf() | !a_is_small) {
             let number = nodes.open(isa, pair.bvh_a, pair.object_a, entry.a, &mut left.0)?;
-            #[cfg(feature = "trace")]
+            #[cfg(feature = "__trace")]
             trace::opened(0, nodes.place_in_treelet(entry.a), number);
             side_a = OpenedSide::opened(number);
         }
         if !b.is_leaf() & (a.is_leaf() | !b_is_small) {
             let number = nodes.open(isa, pair.bvh_b, pair.object_b, entry.b, &mut left.1)?;
-            #[cfg(feature = "trace")]
+            #[cfg(feature = "__trace")]
             trace::opened(1, nodes.place_in_treelet(entry.b), number);
             side_b = OpenedSide::opened(number);
         }

@@ -50,8 +50,8 @@ NATIVE = "speed/setup (cmake, the libraries)"
 QUICK = "cbvh, quick"
 # Name, command and what installs it. {suite} is the folder of the suite, {bin} the folder of what has been built, {python} this Python.
 RUNNERS = (
-    ("cbvh", "cbvh suite", "cargo install cbvh, or a folder with it in PATH"),
-    (QUICK, "cbvh suite --effort quick", "cargo install cbvh, or a folder with it in PATH"),
+    ("cbvh", "cbvh suite", "cargo install cbvh-cli, or a folder with it in PATH"),
+    (QUICK, "cbvh suite --effort quick", "cargo install cbvh-cli, or a folder with it in PATH"),
     *((f"Coal {bv}", f"{{bin}}/coal_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
     *((f"FCL {bv}", f"{{bin}}/fcl_native {bv}", NATIVE) for bv in ("OBBRSS", "kIOS", "RSS")),
     ("parry3d", "{bin}/parry-runner", "speed/setup (cargo)"),

@@ -6,8 +6,8 @@
 #![allow(clippy::print_stdout, reason = "a program prints its results")]
 
 // ANCHOR: program
-use bvh_bake::{Options, read_meshes, to_bytes};
-use bvh_query::{Bvh, Pose, Querier};
+use cbvh::bake::{Options, read_meshes, to_bytes};
+use cbvh::{Bvh, Pose, Querier};
 use std::error::Error;
 
 /// Bakes a mesh file in memory.
