@@ -55,11 +55,6 @@ pub enum QueryError {
     /// The file does not state which of its objects are closed.
     #[error("this file does not say which objects are closed; bake it again with topology")]
     NoTopology,
-    /// All hits of a ray were asked for, and a shape has a radius.
-    #[error(
-        "all_hits: expected a shape without a radius, found one with; ask for the first hit, or for the core"
-    )]
-    Rounded,
     /// The question is about the inside of a shape, and this object of its file is not closed.
     #[error(
         "expected closed objects, found object {object} open: {}; repair the mesh, or ask about its surface",

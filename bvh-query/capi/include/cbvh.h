@@ -1068,7 +1068,9 @@ cbvh_status cbvh_first_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pos
 cbvh_status cbvh_any_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t count, bool *answers);
 /* Lists all hits, ray after ray, in the order along each ray. Hits at exactly the same parameter count as one. `counts`
- * gets the number of hits of each ray, and may be NULL. CBVH_INVALID_ARGUMENT for a mesh with a radius. */
+ * gets the number of hits of each ray, and may be NULL. A mesh with a radius is one body, and its hits are where the ray
+ * enters and leaves it, in turns: at 0 if it starts inside, and without an exit if it ends there. A closed core is hollow
+ * also if it is solid. Bounds of a gap that do not prove it close it. */
 cbvh_status cbvh_all_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_ray *rays,
                           size_t ray_count, size_t *counts, cbvh_ray_hit *hits, size_t capacity, size_t *count);
 

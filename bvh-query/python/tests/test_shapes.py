@@ -158,8 +158,13 @@ class Shapes(unittest.TestCase):
         hit = ball.first_hits([[-5, 0, 0], [-5, 2, 0], [-5, 2.01, 0]], [1, 0, 0])
         self.assertAlmostEqual(hit.t[0], 3, delta=1e-9)
         self.assertEqual(np.isfinite(hit.t).tolist(), [True, True, False])
-        with self.assertRaises(ValueError):
-            ball.all_hits([-5, 0, 0], [1, 0, 0])
+        np.testing.assert_allclose(ball.all_hits([-5, 0, 0], [1, 0, 0]).t, [3, 7], atol=1e-9)
+        np.testing.assert_allclose(ball.all_hits([1, 0, 0], [1, 0, 0]).t, [0, 1], atol=1e-9)
+        self.assertEqual(ball.all_hits([1, 0, 0], [1, 0, 0], until=0.5).t.tolist(), [0])
+        # Two balls that overlap are one body, and two that are apart are two.
+        for radius, ends in ((1.5, [0.5, 5.5]), (0.75, [1.25, 2.75, 3.25, 4.75])):
+            cloud = cbvh.cloud([[0, 0, 0], [2, 0, 0]], radius)
+            np.testing.assert_allclose(cloud.all_hits([-2, 0, 0], [1, 0, 0]).t, ends, atol=1e-9)
 
     def test_wrong_sizes_are_refused(self):
         nan, inf = float("nan"), float("inf")

@@ -37,7 +37,7 @@ pub(crate) use edge_crossing::{EdgeCrossing, edge_crossings};
 pub(crate) use intersection::{segment_intersects, triangles_intersect};
 pub(crate) use point_distance::point_distance;
 pub(crate) use ray_crossing::{Crossing, Ray};
-pub(crate) use rounded_ray::rounded_crossing;
+pub(crate) use rounded_ray::RoundedRay;
 pub use self_contact::SelfContactKind;
 pub(crate) use self_contact::self_contact;
 pub(crate) use stretch::{Way, leaves_before, stretch};

@@ -1,10 +1,10 @@
-//! Decides exactly whether a ray comes within a radius of a triangle, and bounds where it first does.
+//! Decides exactly whether a ray comes within a radius of a triangle, and bounds where it first and last does.
 //!
 //! Along a ray, the distance from a triangle is a convex function f of the parameter, so that the points within the radius r
 //! are an interval, and all that matters follows from values of f: if f(t) > r on one side of a point within, all farther out
-//! on that side is outside, too. The least value is found by halving, with the sign of the slope, and the entry by halving
-//! between a point outside and one inside. Each value comes with certified bounds, so the bounds of the entry are certified.
-//! Where no value proves that the ray comes within r, integers decide. The entry is then only known to be between two points that
+//! on that side is outside, too. The least value is found by halving, with the sign of the slope, and either end of the interval by
+//! halving between a point outside and one inside. Each value comes with certified bounds, so the bounds of the ends are certified.
+//! Where no value proves that the ray comes within r, integers decide. Both ends are then only known to be between two points that
 //! are certainly outside.
 
 use super::within::ray_within;
@@ -29,7 +29,8 @@ struct Value {
     slope_error: f64,
 }
 
-struct Along<'a> {
+/// A ray and a triangle with a radius above 0.
+pub(crate) struct RoundedRay<'a> {
     ray: &'a Ray,
     triangle: &'a Triangle,
     /// The sum of the magnitudes of the triangle's coordinates.
@@ -37,7 +38,52 @@ struct Along<'a> {
     radius: f64,
 }
 
-impl Along<'_> {
+/// What is known of the interval in which a ray is within the radius, before its ends are sought.
+#[derive(Clone, Copy)]
+struct Found {
+    /// In the interval, unless the ray only grazes: then it is where the ray comes nearest, as well as that is known.
+    at: f64,
+    is_graze: bool,
+    /// The interval starts here or later, and ends here or earlier.
+    before: f64,
+    behind: f64,
+}
+
+impl<'a> RoundedRay<'a> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &'a Ray, triangle: &'a Triangle, radius: f64) -> Self {
+        let magnitude = triangle.as_flattened().iter().map(|x| x.abs()).sum();
+        Self { ray, triangle, magnitude, radius }
+    }
+
+    /// Returns whether a ray, whose parameter goes up to `until`, comes within the radius, exactly.
+    pub(crate) fn is_met(&self, until: f64) -> bool {
+        self.starts_inside() || self.is_hit(until, self.end().min(until))
+    }
+
+    /// Returns where a ray, whose parameter goes up to `until`, first comes within the radius. Whether it does is exact.
+    pub(crate) fn entry(&self, until: f64) -> Option<Crossing> {
+        self.find(until).map(|found| self.end_of(&found, found.before))
+    }
+
+    /// Returns where a ray, whose parameter goes up to `until`, first comes within the radius, and where it last is, which may be beyond
+    /// `until`.
+    pub(crate) fn stay(&self, until: f64) -> Option<[Crossing; 2]> {
+        let found = self.find(until)?;
+        let entry = self.end_of(&found, found.before);
+        let whole = if until < self.end() { self.find(f64::INFINITY)? } else { found };
+        let exit = self.end_of(&whole, whole.behind);
+        // The exit is no earlier than the entry, whose bounds may be better.
+        let t = exit.t.max(entry.t);
+        Some([entry, Crossing::around(t, exit.lower.max(entry.lower), exit.upper.max(t))])
+    }
+
+    /// Returns whether all of the ray that is within the radius is certainly between two parameters, given that some of the ray is.
+    pub(crate) fn is_between(&self, from: f64, to: f64) -> bool {
+        let (first, last) = (self.value(from), self.value(to));
+        self.is_before(&first) && self.is_behind(&last)
+    }
+
     #[inline(always)]
     fn point(&self, t: f64) -> Point {
         [0, 1, 2].map(|k| self.ray.origin[k] + t * self.ray.direction[k])
@@ -57,6 +103,23 @@ impl Along<'_> {
             // the coordinates, edges and gaps that it is made of. Components of the direction are below 2.
             slope_error: 64.0 * (error + UNIT_ROUNDOFF * (self.magnitude + closest.distance)),
         }
+    }
+
+    /// Returns whether all of the ray up to a value is certainly outside, and the least one is farther on.
+    #[inline(always)]
+    fn is_before(&self, value: &Value) -> bool {
+        value.lower > self.radius && value.slope < -value.slope_error
+    }
+
+    /// Returns whether all of the ray from a value on is certainly outside, and the least one is farther back.
+    #[inline(always)]
+    fn is_behind(&self, value: &Value) -> bool {
+        value.lower > self.radius && value.slope > value.slope_error
+    }
+
+    fn starts_inside(&self) -> bool {
+        let start = point_distance(Scalar, self.triangle, self.ray.origin);
+        triangles_within(self.triangle, &[self.ray.origin; 3], &start, self.radius)
     }
 
     /// Returns whether the ray comes within the radius, exactly. The part up to `end` decides.
@@ -93,67 +156,66 @@ impl Along<'_> {
         2.0 * (farthest + self.radius) + f64::MIN_POSITIVE
     }
 
-    /// Returns the entry, given a parameter outside before it and one inside.
-    fn entry(&self, outside: f64, inside: f64) -> Crossing {
-        let (mut low, mut high) = (outside, inside);
-        let (mut lower, mut upper) = (outside, inside);
+    /// Finds some of the ray that is within the radius, up to a parameter `until`.
+    fn find(&self, until: f64) -> Option<Found> {
+        let end = self.end().min(until);
+        if self.starts_inside() {
+            return Some(Found { at: 0.0, is_graze: false, before: 0.0, behind: end });
+        }
+        if !self.is_hit(until, end) {
+            return None;
+        }
+        if self.value(end).upper <= self.radius {
+            return Some(Found { at: end, is_graze: false, before: 0.0, behind: end });
+        }
+        // Either side of the least value, and the last parameters there at which the ray is certainly outside.
+        let (mut low, mut high) = (0.0, end);
+        let (mut before, mut behind) = (0.0, end);
         for _ in 0..HALVINGS {
             let middle = low + (high - low) / 2.0;
             if middle <= low || middle >= high {
                 break;
             }
             let value = self.value(middle);
+            if value.upper <= self.radius {
+                return Some(Found { at: middle, is_graze: false, before, behind });
+            }
+            if self.is_before(&value) {
+                before = middle;
+            }
+            if self.is_behind(&value) {
+                behind = middle;
+            }
+            if value.slope < 0.0 { low = middle } else { high = middle }
+        }
+        Some(Found { at: high.clamp(before, behind), is_graze: true, before, behind })
+    }
+
+    /// Returns an end of the interval, given a parameter outside on its side.
+    fn end_of(&self, found: &Found, outside: f64) -> Crossing {
+        if found.is_graze {
+            return Crossing::around(found.at, found.before, found.behind);
+        }
+        let (mut out, mut inside) = (outside, found.at);
+        let mut certain = [out, inside];
+        for _ in 0..HALVINGS {
+            let middle = out + (inside - out) / 2.0;
+            if middle == out || middle == inside {
+                break;
+            }
+            let value = self.value(middle);
             if value.closest.distance > self.radius {
-                low = middle;
+                out = middle;
                 if value.lower > self.radius {
-                    lower = middle;
+                    certain[0] = middle;
                 }
             } else {
-                high = middle;
+                inside = middle;
                 if value.upper <= self.radius {
-                    upper = middle;
+                    certain[1] = middle;
                 }
             }
         }
-        Crossing::around(high, lower, upper)
+        Crossing::around(inside, certain[0].min(certain[1]), certain[0].max(certain[1]))
     }
-}
-
-/// Returns where a ray, whose parameter goes up to `until`, first comes within a radius above 0 of a triangle. Whether it does is
-/// exact.
-pub(crate) fn rounded_crossing(ray: &Ray, until: f64, triangle: &Triangle, radius: f64) -> Option<Crossing> {
-    let magnitude = triangle.as_flattened().iter().map(|x| x.abs()).sum();
-    let along = Along { ray, triangle, magnitude, radius };
-    let start = along.value(0.0);
-    if triangles_within(triangle, &[ray.origin; 3], &start.closest, radius) {
-        return Some(Crossing::around(0.0, 0.0, 0.0));
-    }
-    let end = along.end().min(until);
-    if !along.is_hit(until, end) {
-        return None;
-    }
-    if along.value(end).upper <= radius {
-        return Some(along.entry(0.0, end));
-    }
-    // Either side of the least value, and the last parameters there at which the ray is certainly outside.
-    let (mut low, mut high) = (0.0, end);
-    let (mut before, mut behind) = (0.0, end);
-    for _ in 0..HALVINGS {
-        let middle = low + (high - low) / 2.0;
-        if middle <= low || middle >= high {
-            break;
-        }
-        let value = along.value(middle);
-        if value.upper <= radius {
-            return Some(along.entry(before, middle));
-        }
-        if value.lower > radius && value.slope < -value.slope_error {
-            before = middle;
-        }
-        if value.lower > radius && value.slope > value.slope_error {
-            behind = middle;
-        }
-        if value.slope < 0.0 { low = middle } else { high = middle }
-    }
-    Some(Crossing::around(high.clamp(before, behind), before, behind))
 }

@@ -117,7 +117,8 @@ impl Scene {
     }
 
     /// Returns all hits of each of many rays in the world, in the order along the ray: see [`Querier::all_hits`]. Each
-    /// parameter occurs once, however many instances are hit at exactly that parameter.
+    /// parameter occurs once, however many instances are hit at exactly that parameter. An instance with a radius or a margin is a body
+    /// of its own: entries and exits of each are hits, also where bodies overlap.
     ///
     /// # Errors
     /// Those of [`Scene::first_hits`].
@@ -125,7 +126,7 @@ impl Scene {
         self.each_probe(rays, |search, ray| {
             let mut all = All::new(ray)?;
             search.line(&mut all)?;
-            Ok(all.hits().map(|(instance, hit)| search.hit(instance, hit)).collect())
+            Ok(all.hits().into_iter().map(|(instance, hit)| search.hit(instance, hit)).collect())
         })
     }
 

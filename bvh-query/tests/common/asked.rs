@@ -64,9 +64,10 @@ impl Answers {
             self.segment.as_ref().err(),
             self.open_edges.as_ref().err(),
         ];
-        errors.into_iter().flatten().find(|error| {
-            !matches!(error, QueryError::NoTopology | QueryError::Rounded | QueryError::NotClosed { .. })
-        })
+        errors
+            .into_iter()
+            .flatten()
+            .find(|error| !matches!(error, QueryError::NoTopology | QueryError::NotClosed { .. }))
     }
 
     /// Returns whether any answer was refused.

@@ -642,7 +642,9 @@ export class Mesh extends Handle<raw.Mesh> {
         return this.#rays(origins, directions, options, raw.anyHits);
     }
 
-    /** All triangles that N rays hit, in the exact order along each: an answer for each ray, with an element for each hit. */
+    /** All triangles that N rays hit, in the exact order along each: an answer for each ray, with an element for each hit. A mesh with
+     * a radius is one body, and its hits are where the ray enters and leaves it, in turns: at 0 if it starts inside, and without
+     * an exit if it ends there. A closed core is hollow also if it is solid. */
     allHits(origins: Numbers, directions: Numbers, options: RayOptions = {}): RayHits[] {
         return this.#rays(origins, directions, options, raw.allHits).map(answers.hits);
     }

@@ -594,7 +594,9 @@ class Mesh:
         """All triangles that rays hit, in the exact order along each: a `RayHit` of arrays of K elements, or a list of
         N.
 
-        Arguments are those of `first_hits`.
+        Arguments are those of `first_hits`. A mesh with a radius is one body, and its hits are where the ray enters and leaves it,
+        in turns: at 0 if it starts inside, and without an exit if it ends there. A closed core is hollow also if it is solid.
+        Parts of the ray inside are told apart if their bounds prove the gap between them.
         """
         found = _cbvh.all_hits((self._mesh, pose, parallel), origins, directions, until)
         return [RayHit(*hits) for hits in found] if isinstance(found, list) else RayHit(*found)

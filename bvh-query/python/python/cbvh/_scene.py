@@ -528,7 +528,8 @@ class Scene:
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, *, until: ArrayLike = np.inf) -> Any:
         """All hits of rays in the world, in the exact order along each: a `SceneRayHit` of arrays, or a list of N.
 
-        Each parameter occurs once, however many instances are hit at exactly that parameter.
+        Each parameter occurs once, however many instances are hit at exactly that parameter. An instance with a radius or a
+        margin is a body of its own, which the ray enters and leaves: see `Mesh.all_hits`.
         """
         found = _cbvh.all_hits(self._scene, origins, directions, until)
         return [_hits(of_ray) for of_ray in found] if isinstance(found, list) else _hits(found)

@@ -1,6 +1,6 @@
 //! Rays at triangles whose corners are no numbers, which only damaged files have.
 
-use crate::narrow::{Ray, rounded_crossing};
+use crate::narrow::{Ray, RoundedRay};
 
 #[test]
 fn corners_that_are_not_finite_do_no_harm() {
@@ -20,7 +20,7 @@ fn corners_that_are_not_finite_do_no_harm() {
                             let _ = ray.is_within(&triangle, &found, 0.5);
                             let _ = ray.compare((&triangle, &found), (&triangle, &found));
                         }
-                        let _ = rounded_crossing(&ray, f64::INFINITY, &triangle, 0.5);
+                        let _ = RoundedRay::new(&ray, &triangle, 0.5).stay(f64::INFINITY);
                     }
                 }
             }

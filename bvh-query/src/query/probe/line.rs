@@ -6,7 +6,6 @@
 use crate::error::QueryError;
 use crate::file::bvh::Bvh;
 use crate::file::place::{LeafPacket, TrianglePlace};
-use crate::file::shape::Shape;
 use crate::narrow::{Point, Triangle};
 use crate::numerics::{MAX_STRETCH, SLACK, round_up};
 use crate::query::exact::{placed, stored};
@@ -48,11 +47,6 @@ pub(crate) trait LineQuestion {
     /// Returns whether the radii of shapes do not matter.
     fn is_about_cores(&self) -> bool {
         false
-    }
-
-    /// Refuses shapes about which the question is not defined.
-    fn admits(&self, _: &Shape<'_>) -> Result<(), QueryError> {
-        Ok(())
     }
 
     /// Decides about a triangle that the line may meet. All that it does meet up to the limit are named, in any order.

@@ -34,7 +34,6 @@ impl Querier {
         placed: &PlacedShape<'_>,
         question: &mut impl LineQuestion,
     ) -> Result<(), QueryError> {
-        question.admits(&placed.shape)?;
         for index in 0..placed.shape.objects().len() {
             self.memory.budget.visit()?;
             self.ask_line_of_object(placed, index, question)?;
@@ -63,7 +62,6 @@ impl Querier {
         if !self.memory.budget.is_unlimited() {
             return Err(self.memory.budget.error());
         }
-        questions.first().map_or(Ok(()), |question| question.admits(&placed.shape))?;
         for index in 0..placed.shape.objects().len() {
             self.ask_lines_of_object(placed, index, &mut questions.iter_mut())?;
         }

@@ -13,3 +13,4 @@ pub(crate) mod ray;
 pub(crate) mod relation;
 pub(crate) mod segment;
 pub(crate) mod side;
+mod stays;

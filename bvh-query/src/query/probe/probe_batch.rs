@@ -117,7 +117,9 @@ impl<'a> ProbeBatch<'a> {
     /// # Errors
     /// The error of the first ray that fails.
     pub fn all_hits(&self, rays: &[Ray]) -> Result<Vec<Vec<RayHit>>, QueryError> {
-        self.each_line(rays, of_ray, Scaled::new, All::about, |all| all.hits().map(|(_, hit)| hit).collect())
+        self.each_line(rays, of_ray, Scaled::new, All::about, |all| {
+            all.hits().into_iter().map(|(_, hit)| hit).collect()
+        })
     }
 
     /// Answers [`Querier::segment_hit`] for each segment, given by its ends.

@@ -1,11 +1,11 @@
 //! What a ray hits: the first hit, any hit, or all hits.
 
 use crate::error::{NumberError, QueryError};
-use crate::file::shape::Shape;
-use crate::narrow::{self, Crossing, Triangle, rounded_crossing};
+use crate::narrow::{self, Crossing, RoundedRay, Triangle};
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
+use crate::query::probe::stays::{Rounded, ends};
 use crate::query::querier::Querier;
 use std::cmp::Ordering;
 
@@ -99,9 +99,20 @@ impl Querier {
     /// exactly that parameter: a ray through an edge hits once, and the hit names the triangle with the lowest numbers.
     /// If the ray lies in a triangle's plane and meets it, the first point counts.
     ///
+    /// A rounded shape is one body, all points within the radius of its core, and its hits are where the ray enters and leaves it,
+    /// in turns. The first hit is that of [`Querier::first_hit`], at 0 if the ray starts in the body, and an exit beyond `until` is no
+    /// hit. Each hit names the triangle within whose radius the ray comes there, or ceases to be; of several at the same parameter,
+    /// the one with the lowest numbers. A ray that only touches the body enters and leaves it at the same parameter. A closed core
+    /// is hollow, whether it is solid or not, as it is for the first hit: a ray that passes its inside leaves the body, and enters
+    /// it again on the other side. Whether there are hits is exact, and so are their `lower` and `upper` as bounds. Two parts of
+    /// the ray in the body are told apart if their bounds prove the gap between them, and are one if not, so each gap that is
+    /// reported is one. If `until` is between the bounds of an exit, `t` decides whether the exit is a hit.
+    ///
+    /// Cost: that of visiting each triangle that the ray meets. For a rounded shape, some microseconds per triangle at which the ray may
+    /// enter or leave the body, a fraction of a microsecond per other triangle within whose radius it comes, and up to 1 KiB for each.
+    ///
     /// # Errors
-    /// [`QueryError::Rounded`] for a shape with a radius: its surface is that of a union of rounded triangles, which this
-    /// question does not know. Else the errors of [`Querier::first_hit`].
+    /// The errors of [`Querier::first_hit`].
     pub fn all_hits<'a>(
         &mut self,
         shape: impl Into<PlacedShape<'a>>,
@@ -110,7 +121,7 @@ impl Querier {
         let mut all = All::new(ray)?;
         self.start();
         self.ask_line(&shape.into(), &mut all)?;
-        Ok(all.hits().map(|(_, hit)| hit).collect())
+        Ok(all.hits().into_iter().map(|(_, hit)| hit).collect())
     }
 }
 
@@ -157,7 +168,7 @@ impl Scaled {
     #[inline(always)]
     fn crossing(&self, Candidate { triangle, radius, .. }: &Candidate<'_>) -> Option<Crossing> {
         if *radius > 0.0 {
-            return rounded_crossing(&self.ray, self.until, triangle, *radius);
+            return RoundedRay::new(&self.ray, triangle, *radius).entry(self.until);
         }
         self.ray.crossing(triangle).filter(|crossing| self.ray.is_within(triangle, crossing, self.until))
     }
@@ -165,19 +176,18 @@ impl Scaled {
     /// Returns whether it meets a triangle within its length.
     #[inline(always)]
     fn meets(&self, candidate: &Candidate<'_>) -> bool {
-        match candidate.radius > 0.0 {
-            true => self.crossing(candidate).is_some(),
-            false => self.ray.meets(&candidate.triangle, self.until),
+        let Candidate { triangle, radius, .. } = candidate;
+        if *radius > 0.0 {
+            return RoundedRay::new(&self.ray, triangle, *radius).is_met(self.until);
         }
+        self.ray.meets(triangle, self.until)
     }
 
     /// Returns a hit as an answer, and the number of its instance.
-    fn hit(&self, met: &Met) -> (u32, RayHit) {
+    fn hit(&self, crossing: &Crossing, (instance, object, triangle): Numbers) -> (u32, RayHit) {
         let narrow::Ray { origin, direction } = self.ray;
-        let crossing = &met.crossing;
         // A product with a power of two: exact, unless it underflows.
         let scaled = |t: f64| if t > 0.0 { (t * self.unit).max(f64::MIN_POSITIVE) } else { 0.0 };
-        let (instance, object, triangle) = met.numbers;
         let hit = RayHit {
             t: scaled(crossing.t),
             lower: if crossing.lower * self.unit < f64::MIN_POSITIVE {
@@ -194,13 +204,15 @@ impl Scaled {
     }
 }
 
+/// The numbers of a triangle's instance, its object and itself.
+pub(super) type Numbers = (u32, u32, u32);
+
 /// A triangle that a ray meets.
 #[derive(Clone, Copy)]
 struct Met {
     crossing: Crossing,
     triangle: Triangle,
-    /// The numbers of its instance, its object and itself.
-    numbers: (u32, u32, u32),
+    numbers: Numbers,
 }
 
 impl Met {
@@ -238,7 +250,7 @@ impl First {
         let order = |met: &&Met| (met.crossing.t, met.numbers);
         let all = self.best.iter().chain(&self.best_rounded);
         all.min_by(|x, y| order(x).partial_cmp(&order(y)).unwrap_or(Ordering::Equal))
-            .map(|best| self.ray.hit(best))
+            .map(|best| self.ray.hit(&best.crossing, best.numbers))
     }
 
     /// Returns the parameter of the first hit of a triangle without a radius, and the triangle's unit normal.
@@ -327,7 +339,9 @@ impl LineQuestion for Any {
 /// Which triangles are met?
 pub(crate) struct All {
     ray: Scaled,
+    /// The triangles without a radius.
     met: Vec<Met>,
+    rounded: Vec<Rounded>,
 }
 
 impl All {
@@ -338,15 +352,27 @@ impl All {
 
     #[inline(always)]
     pub(super) fn about(ray: Scaled) -> Self {
-        Self { ray, met: Vec::new() }
+        Self { ray, met: Vec::new(), rounded: Vec::new() }
     }
 
     /// Returns the hits in the order along the ray, with the numbers of their instances.
-    pub(crate) fn hits(&mut self) -> impl ExactSizeIterator<Item = (u32, RayHit)> {
-        let Self { ray, met } = self;
+    pub(crate) fn hits(&mut self) -> Vec<(u32, RayHit)> {
+        let Self { ray, met, rounded } = self;
         met.sort_unstable_by(|x, y| x.compare(ray, y).then(x.numbers.cmp(&y.numbers)));
         met.dedup_by(|later, earlier| later.compare(ray, earlier).is_eq());
-        met.iter().map(|met| ray.hit(met))
+        let mut ends = ends(&ray.ray, ray.until, rounded).into_iter().peekable();
+        let mut hits = Vec::with_capacity(met.len() + ends.len());
+        for of in met.iter() {
+            let earlier = |(crossing, numbers): &(Crossing, Numbers)| {
+                (crossing.t, *numbers) < (of.crossing.t, of.numbers)
+            };
+            while let Some((crossing, numbers)) = ends.next_if(earlier) {
+                hits.push(ray.hit(&crossing, numbers));
+            }
+            hits.push(ray.hit(&of.crossing, of.numbers));
+        }
+        hits.extend(ends.map(|(crossing, numbers)| ray.hit(&crossing, numbers)));
+        hits
     }
 }
 
@@ -355,17 +381,18 @@ impl LineQuestion for All {
         self.ray.line()
     }
 
-    fn admits(&self, shape: &Shape<'_>) -> Result<(), QueryError> {
-        if shape.radius() > 0.0 { Err(QueryError::Rounded) } else { Ok(()) }
-    }
-
     #[inline(always)]
     fn limit(&self) -> f64 {
         self.ray.until
     }
 
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
-        if let Some(crossing) = self.ray.crossing(candidate) {
+        if candidate.radius > 0.0 {
+            if self.ray.meets(candidate) {
+                let of = (&candidate.triangle, candidate.radius);
+                self.rounded.push(Rounded::new(&self.ray.ray, of, candidate.numbers()?));
+            }
+        } else if let Some(crossing) = self.ray.crossing(candidate) {
             self.met.push(Met::new(crossing, candidate)?);
         }
         Ok(())

@@ -140,6 +140,7 @@ fn the_tree_changes_no_answer() {
                 for (ray, expected) in rays.iter().zip(&expected) {
                     assert_eq!(querier.first_hit(shape, ray), Ok(*expected), "{} {ray:?} {pose:?}", of.name);
                     assert_eq!(querier.any_hit(shape, ray), Ok(expected.is_some()));
+                    assert_eq!(querier.all_hits(shape, ray), slow.all_hits(shape, ray));
                     let to = [0, 1, 2].map(|k| ray.origin[k] + ray.direction[k].clamp(-1e30, 1e30));
                     let met = slow.segment_hit(shape, ray.origin, to);
                     assert_eq!(querier.segment_hit(shape, ray.origin, to), met);

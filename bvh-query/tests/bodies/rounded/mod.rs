@@ -1,5 +1,6 @@
 //! Compares answers about rounded shapes with their definition, in exact arithmetic over all pairs of triangles.
 
+mod all_hits;
 mod files;
 mod solids;
 
@@ -386,7 +387,10 @@ fn rays_hit_rounded_cores_exactly() {
                 assert_eq!(querier.any_hit(shape, &endless).unwrap(), order.is_le());
                 assert_eq!(querier.first_hit(shape, &endless).unwrap().is_some(), order.is_le());
             }
-            assert_eq!(querier.all_hits(shape, &ray).unwrap_err(), QueryError::Rounded);
+            assert_eq!(
+                querier.all_hits(shape, &ray).unwrap().first().map(|hit| hit.t),
+                first.map(|hit| hit.t)
+            );
         }
         seen[(order as i8 + 1) as usize] += 1;
     }
