@@ -15,7 +15,7 @@
 //! | where is the closest surface to a point? | [`Querier::closest_point`] | distance, point, triangle id |
 //! | is a point inside, and how deep? | [`Querier::side`], [`Querier::signed_point_distance`] | inside, on, outside; exact |
 //! | what does a ray hit? | [`Querier::first_hit`], [`Querier::any_hit`], [`Querier::all_hits`] | parameter, point, triangle id; exact order |
-//! | is the line between two points free? | [`Querier::segment_hit`] | `bool`, exact |
+//! | is the line between two points free? | [`Querier::segment_hit`], [`Querier::visible`] | `bool`, exact |
 //! | how far apart are they or, below zero, how deep do they overlap? | [`Querier::signed_distance`] | certified bounds, points, the way out |
 //! | which are near, and how far apart? | [`Querier::signed_distance_within`], [`Scene::near_pairs`] | signed distances of what is within a margin |
 //! | how much do they have in common? | [`Querier::intersection`] | volume with a certified error, areas, box, thickness of what is pierced |

@@ -1083,6 +1083,12 @@ typedef struct cbvh_segment {
 /* Answers whether each segment meets the mesh, exactly. */
 cbvh_status cbvh_segment_hits(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose,
                                const cbvh_segment *segments, size_t count, bool *answers);
+/* Answers whether the ends of each segment see each other: whether no part of it, but for what is within `margin` mesh
+ * units of either end, meets the mesh. With a margin of 0 a point on the mesh sees nothing, as the segment touches the
+ * mesh there. For points on a surface, take a margin that is longer than their coordinates are off, such as a millionth
+ * of the size of the mesh. Points at most two margins apart see each other. */
+cbvh_status cbvh_visible(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const cbvh_segment *segments,
+                         size_t count, double margin, bool *answers);
 
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
@@ -1288,6 +1294,8 @@ cbvh_status cbvh_scene_any_hits(cbvh_scene scene, const cbvh_ray *rays, size_t c
 cbvh_status cbvh_scene_all_hits(cbvh_scene scene, const cbvh_ray *rays, size_t ray_count, size_t *counts,
                                 cbvh_ray_hit *hits, size_t capacity, size_t *count);
 cbvh_status cbvh_scene_segment_hits(cbvh_scene scene, const cbvh_segment *segments, size_t count, bool *answers);
+cbvh_status cbvh_scene_visible(cbvh_scene scene, const cbvh_segment *segments, size_t count, double margin,
+                               bool *answers);
 
 /* ---------------------------------------------------------------------------------------------------------- robots
  *

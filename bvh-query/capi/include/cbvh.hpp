@@ -1118,6 +1118,13 @@ public:
             return cbvh_segment_hits(raw(), mesh.raw(), &pose, segments.data(), segments.size(), answers);
         });
     }
+    /// Whether the ends of each segment see each other past a mesh: see cbvh_visible.
+    std::vector<bool> visible(const Mesh &mesh, const std::vector<Segment> &segments, double margin = 0,
+                              const Pose &pose = {}) {
+        return detail::choices(segments.size(), [&](bool *answers) {
+            return cbvh_visible(raw(), mesh.raw(), &pose, segments.data(), segments.size(), margin, answers);
+        });
+    }
 
 private:
     using Owned = detail::Handle<cbvh_querier, cbvh_querier_free>;
@@ -1481,6 +1488,11 @@ public:
     std::vector<bool> segment_hits(const std::vector<Segment> &segments) {
         return detail::choices(segments.size(), [&](bool *answers) {
             return cbvh_scene_segment_hits(raw(), segments.data(), segments.size(), answers);
+        });
+    }
+    std::vector<bool> visible(const std::vector<Segment> &segments, double margin = 0) {
+        return detail::choices(segments.size(), [&](bool *answers) {
+            return cbvh_scene_visible(raw(), segments.data(), segments.size(), margin, answers);
         });
     }
 

@@ -171,6 +171,9 @@ probes! {
     cbvh_segment_hits, cbvh_scene_segment_hits(segments: *const SegmentRow, count: usize,) -> bool:
         |into| read_segments(segments, count, into), |of, segments| of.segment_hits(segments),
         |querier, mesh, [from, to]| querier.segment_hit(mesh, from, to), bool::from;
+    cbvh_visible, cbvh_scene_visible(segments: *const SegmentRow, count: usize, margin: f64,) -> bool:
+        |into| read_segments(segments, count, into), |of, segments| of.visible(segments, margin),
+        |querier, mesh, [from, to]| querier.visible(mesh, from, to, margin), bool::from;
 }
 
 #[unsafe(no_mangle)]

@@ -63,6 +63,13 @@ static void cubes(const char *parallel) {
     CHECK(count == 2 && counts[0] == 2 && counts[1] == 0 && hits[0].t == 4.5 && hits[1].t == 5.5);
     const cbvh_segment segments[2] = {{{0, 0, 0}, {0, 0, 0.5}}, {{0, 0, 0}, {0, 0, 0.25}}};
     OK(cbvh_segment_hits(querier, one, NULL, segments, 2, any));
+    bool sees[2];
+    OK(cbvh_visible(querier, one, NULL, segments, 2, 0, sees));
+    CHECK(sees[0] == !any[0] && sees[1] == !any[1]);
+    OK(cbvh_visible(querier, one, NULL, segments, 2, 0.25, sees));
+    CHECK(sees[0] && sees[1]);
+    FAILS(cbvh_visible(querier, one, NULL, segments, 2, -1, sees), CBVH_INVALID_ARGUMENT,
+          "margin: expected a finite distance of at least 0, found -1");
     CHECK(any[0] && !any[1]);
     OK(cbvh_mesh_free(one));
     OK(cbvh_mesh_free(quarter));
@@ -1071,7 +1078,10 @@ static void scenes(int parallel, int tracking) {
     OK(cbvh_scene_any_hits(scene, &ray, 1, &answer));
     CHECK(hits[0].t == 4.5 && answer);
     const cbvh_segment segment = {{0, 0, 3}, {0, 0, 2}};
+    bool sees;
+    OK(cbvh_scene_visible(scene, &segment, 1, 0, &sees));
     OK(cbvh_scene_segment_hits(scene, &segment, 1, &answer));
+    CHECK(sees == !answer);
     CHECK(!answer);
     char name[2];
     size_t length;

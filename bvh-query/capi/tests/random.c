@@ -200,7 +200,7 @@ int main(int argument_count, char **arguments) {
         case 17: status = cbvh_first_hits(q, a, more, in, n, out); break;
         case 18: status = cbvh_any_hits(q, a, more, in, n, out); break;
         case 19: status = cbvh_all_hits(q, a, more, in, n, below(2) ? NULL : counts, out, capacity, &count); break;
-        case 20: status = cbvh_segment_hits(q, a, more, in, n, out); break;
+        case 20: status = below(2) ? cbvh_segment_hits(q, a, more, in, n, out) : cbvh_visible(q, a, more, in, n, x, out); break;
         case 21: status = cbvh_mesh_clone(a, (cbvh_mesh *)&made); break;
         case 22: status = cbvh_mesh_object(a, below(3), (cbvh_mesh *)&made); break;
         case 23: status = cbvh_mesh_object_name(a, below(3), out, capacity, &count); break;

@@ -162,6 +162,7 @@ void answers(bool parallel) {
     CHECK(querier.any_hit(one, rays[0]) && !querier.any_hit(one, rays[0], cbvh::Pose::translation(3, 0, 0)));
     CHECK(querier.all_hits(one, rays)[0].size() == 2 && querier.any_hits(one, rays) == std::vector<bool>({true, false}));
     CHECK(querier.segment_hits(one, {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 0}, {0, 0, 0.1}}}) == std::vector<bool>({true, false}));
+    CHECK(querier.visible(one, {{{0, 0, 0}, {0, 0, 1}}, {{0, 0, 0}, {0, 0, 0.1}}}) == std::vector<bool>({false, true}));
     cbvh::Tracker tracker;
     for (const cbvh::Pose &pose : poses) {
         CHECK(tracker.collide(querier, one, one, pose) == querier.collide(one, one, pose));
@@ -373,6 +374,7 @@ void scenes() {
     CHECK(scene.first_hits({down, up})[0]->t == 4.5 && !scene.first_hits({down, up})[1] && scene.any_hit(down) && !scene.any_hit(up));
     CHECK(scene.all_hits({{{0, 0.1, 5}, {0, 0, -1}}})[0].size() == 2 && scene.any_hits({{{9, 9, 5}, {0, 0, -1}}})[0] == false);
     CHECK(scene.sides({{9, 9, 9}})[0] == CBVH_OUTSIDE && scene.segment_hits({{{0, 0, 0}, {0, 0, 3}}})[0]);
+    CHECK(!scene.visible({{{0, 0, 0}, {0, 0, 3}}})[0] && scene.visible({{{0, 0, 0}, {0, 0, 3}}}, 1.5)[0]);
     // Ways are values. One whose path is gone is refused, and a path that has no name is no path for one.
     std::vector<cbvh::Scene::Way> ways;
     {

@@ -59,6 +59,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         probes::first_hits,
         probes::any_hits,
         probes::all_hits,
+        probes::visible,
         probes::segment_hits
     ];
     functions![

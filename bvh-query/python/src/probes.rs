@@ -250,10 +250,32 @@ pub(crate) fn all_hits<'py>(
     question.answers().lists(&found, hits)
 }
 
-/// Reads segments: starts and ends of shape (3,) or (N, 3). One start serves N ends, and one end N starts.
-fn segments(starts: &Bound<'_, PyAny>, ends: &Bound<'_, PyAny>) -> PyResult<Rows<[[f64; 3]; 2]>> {
-    let ends = read_points(ends, "ends")?;
-    read_points(starts, "starts")?.with("starts", (&ends, "ends"), |&start, &end, _| Ok([start, end]))
+/// Reads pairs of points, such as the ends of segments, of shape (3,) or (N, 3) with the names of their arguments. One point of
+/// either kind serves N of the other.
+fn pairs(
+    (starts, of_starts): (&Bound<'_, PyAny>, &str),
+    (ends, of_ends): (&Bound<'_, PyAny>, &str),
+) -> PyResult<Rows<[[f64; 3]; 2]>> {
+    let ends = read_points(ends, of_ends)?;
+    read_points(starts, of_starts)?.with(of_starts, (&ends, of_ends), |&start, &end, _| Ok([start, end]))
+}
+
+#[pyfunction]
+pub(crate) fn visible<'py>(
+    of: Of<'py>,
+    points_a: &Bound<'py, PyAny>,
+    points_b: &Bound<'py, PyAny>,
+    margin: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let pairs = pairs((points_a, "points_a"), (points_b, "points_b"))?;
+    let question = Question::new(points_a.py(), of, pairs)?;
+    let margin = number(margin, "margin")?;
+    let found = question.ask(
+        |batch, pairs| batch.visible(pairs, margin),
+        |querier, shape, &[a, b]| querier.visible(shape, a, b, margin),
+        |scene, pairs| scene.visible(pairs, margin),
+    )?;
+    question.answers().values(found.into_iter())
 }
 
 #[pyfunction]
@@ -262,7 +284,7 @@ pub(crate) fn segment_hits<'py>(
     starts: &Bound<'py, PyAny>,
     ends: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let question = Question::new(starts.py(), of, segments(starts, ends)?)?;
+    let question = Question::new(starts.py(), of, pairs((starts, "starts"), (ends, "ends"))?)?;
     let found = question.ask(
         |batch, segments| batch.segment_hits(segments),
         |querier, shape, &[start, end]| querier.segment_hit(shape, start, end),

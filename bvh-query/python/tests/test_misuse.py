@@ -66,6 +66,8 @@ class BadArguments(unittest.TestCase):
             (TypeError, "", cbvh.Mesh.from_bytes, 5),
             (ValueError, "directions: expected as many as of origins, 2, found 3", mesh.first_hits, np.zeros((2, 3)), np.ones((3, 3))),
             (ValueError, "ends: expected as many as of starts, 2, found 3", mesh.segment_hits, np.zeros((2, 3)), np.ones((3, 3))),
+            (ValueError, "points_b: expected as many as of points_a, 2, found 3", mesh.visible, np.zeros((2, 3)), np.ones((3, 3))),
+            (TypeError, "margin: ", lambda: mesh.visible([0, 0, 0], [1, 1, 1], margin="far")),
             (ValueError, "direction", mesh.first_hits, [0, 0, 0], [0, 0, 0]),
             (ValueError, "vertices: expected shape (V, 3), found (8, 2)", cbvh.bake, vertices[:, :2], faces),
             (ValueError, "faces: expected numbers from 0 to 7, found 0 to 8", cbvh.bake, vertices, [[0, 1, 8]]),

@@ -32,6 +32,12 @@ class Geometry(unittest.TestCase):
         scene.add(self.cube)
         self.assertEqual(scene.any_hits(origin, ways).tolist(), self.cube.any_hits(origin, ways).tolist())
         self.assertEqual(scene.segment_hits(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [True, False])
+        for of in (self.cube, scene):
+            self.assertEqual(of.visible(origin, [[0, 0, 0.5], [0, 0, 4]]).tolist(), [False, True])
+            self.assertEqual(of.visible([[0, 0, 0.5], [0, 0, 4]], origin, margin=0.25).tolist(), [True, True])
+            self.assertIs(of.visible(origin, [0, 0, -5]), False)
+            with self.assertRaisesRegex(ValueError, "margin: expected a finite distance of at least 0, found -1"):
+                of.visible(origin, [0, 0, -5], margin=-1)
 
     def test_probes(self):
         points = np.random.default_rng(1).uniform(-1, 1, (200, 3))
@@ -58,6 +64,14 @@ class Geometry(unittest.TestCase):
             self.assertEqual([len(hit.t) for hit in every], crosses.astype(int).tolist())
             below = above * [1, 1, -1]
             np.testing.assert_array_equal(self.cube.segment_hits(above, below, parallel=parallel), crosses)
+            np.testing.assert_array_equal(self.cube.visible(above, below, parallel=parallel), ~crosses)
+            # From one face of the cube to what is beyond the other one, and to where the margins end.
+            top = points * [1, 1, 0] + [0, 0, 0.5]
+            for margin, sees in ((0.0, ~crosses), (0.01, ~crosses), (1.25, np.ones(200, bool))):
+                found = self.cube.visible(top, below, margin=margin, parallel=parallel)
+                np.testing.assert_array_equal(found, sees)
+            np.testing.assert_array_equal(self.cube.visible(top, above, margin=0.01, parallel=parallel), np.ones(200, bool))
+            np.testing.assert_array_equal(self.cube.visible(top, above, parallel=parallel), ~crosses)
 
     def test_as_many_ends_as_rays(self):
         above, down = [[0.1, 0.2, 5], [0.1, 0.2, 5]], [[0, 0, -1], [0, 0, -1]]

@@ -14,7 +14,7 @@ use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::{check_point, sum_of_magnitudes};
 use crate::query::probe::ray::RayHit;
 use crate::query::probe::ray::{All, Any, First, Ray};
-use crate::query::probe::segment::MeetsSegment;
+use crate::query::probe::segment::{MeetsSegment, check_margin};
 use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
 use crate::query::stats::QueryStats;
@@ -140,6 +140,19 @@ impl Scene {
             let mut question = MeetsSegment::new(*from, *to)?;
             search.line(&mut question)?;
             Ok(question.met)
+        })
+    }
+
+    /// Returns whether the two points of each of many pairs in the world see each other past all instances: see [`Querier::visible`].
+    ///
+    /// # Errors
+    /// [`SceneError::Query`] for a margin or points that [`Querier::visible`] refuses; else those of [`Scene::segment_hits`].
+    pub fn visible(&mut self, pairs: &[[[f64; 3]; 2]], margin: f64) -> Result<Vec<bool>, SceneError> {
+        check_margin(margin)?;
+        self.each_probe(pairs, |search, [from, to]| {
+            let mut question = MeetsSegment::without_ends(*from, *to, margin)?;
+            search.line(&mut question)?;
+            Ok(!question.met)
         })
     }
 

@@ -107,16 +107,18 @@ pub fn all_hits(mesh: &Mesh, pose: Option<Float64Array>, rays: Rays) -> Answer<A
     Ok(found.into_iter().map(hits).collect())
 }
 
-#[wasm_bindgen(js_name = segmentHits)]
-pub fn segment_hits(
+/// Segments meet what hides their ends from each other.
+#[wasm_bindgen]
+pub fn visible(
     mesh: &Mesh,
     pose: Option<Float64Array>,
     starts: &Float64Array,
     ends: &Float64Array,
+    margin: f64,
 ) -> Answer<Uint8Array> {
     let segments = segments(starts, ends)?;
     let found = ask(mesh, pose.as_ref(), &segments, |querier, shape, &[start, end]| {
-        querier.segment_hit(shape, start, end)
+        querier.visible(shape, start, end, margin)
     })?;
     Ok(answers::small(found.into_iter().map(u8::from)))
 }

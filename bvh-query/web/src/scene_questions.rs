@@ -217,10 +217,9 @@ impl Scene {
         Ok(hits.map(|of_ray| self.hits(&of_ray.into_iter().map(Some).collect::<Vec<_>>())).collect())
     }
 
-    #[wasm_bindgen(js_name = segmentHits)]
-    pub fn segment_hits(&mut self, starts: &Float64Array, ends: &Float64Array) -> Answer<Uint8Array> {
+    pub fn visible(&mut self, starts: &Float64Array, ends: &Float64Array, margin: f64) -> Answer<Uint8Array> {
         let segments = segments(starts, ends)?;
-        Ok(small(self.ask(|scene| scene.segment_hits(&segments))?.into_iter().map(u8::from)))
+        Ok(small(self.ask(|scene| scene.visible(&segments, margin))?.into_iter().map(u8::from)))
     }
 }
 

@@ -477,6 +477,8 @@ export const cases = {
         const all = cube.allHits([-5, 0.1, 0.2], [2, 0, 0]);
         equal([all.length, all[0].t], [1, [2, 3]]);
         equal(cube.segmentHits([-5, 0.1, 0.2, 0, 0, 0], [0, 0.1, 0.2, 0.5, 0.5, 0.5]), [1, 0]);
+        equal(cube.visible([-5, 0.1, 0.2, 0, 0, 0], [0, 0.1, 0.2, 0.5, 0.5, 0.5]), [0, 1]);
+        equal(cube.visible([-5, 0.1, 0.2], [0, 0.1, 0.2], { margin: 2.5 }), [1]);
         const open = cbvh.Mesh.bake([0, 0, 0, 1, 0, 0, 0, 1, 0]);
         equal([open.sides([0, 0, 1]), open.signedPointDistances([0, 0, 1])], [[2], [NaN]]);
     },
@@ -553,6 +555,7 @@ export const cases = {
             ],
         );
         equal(scene.segmentHits([2, 0, 1], [2, 0, 9]), [0]);
+        equal(scene.visible([2, 0, 1], [2, 0, 9], { margin: 0.1 }), [1]);
     },
 
     "simple shapes are exact, and margins count in every question": (cbvh) => {

@@ -651,7 +651,19 @@ export class Mesh extends Handle<raw.Mesh> {
 
     /** Whether N closed segments meet the surface, exactly: 1 or 0 for each. Starts and ends are 3 N numbers each. */
     segmentHits(starts: Numbers, ends: Numbers, options: { pose?: Numbers } = {}): Uint8Array {
+        return this.visible(starts, ends, options).map((sees) => 1 - sees);
+    }
+
+    /**
+     * Whether the points of N pairs see each other past the surface: 1 or 0 for each. Starts and ends are 3 N numbers each.
+     *
+     * They do if the segment between them, but for what is within `margin` of either, does not meet the surface. With a margin of
+     * 0, a point on the surface sees nothing, as the segment touches the surface there. For such points, take a margin that is
+     * longer than their coordinates are off, such as a millionth of the size of the mesh. Points at most two margins apart see
+     * each other.
+     */
+    visible(starts: Numbers, ends: Numbers, options: { margin?: number; pose?: Numbers } = {}): Uint8Array {
         const [from, to, pose] = [floats(starts, "starts"), floats(ends, "ends"), placed(options.pose)];
-        return this.#call((mesh) => raw.segmentHits(mesh, pose, from, to));
+        return this.#call((mesh) => raw.visible(mesh, pose, from, to, options.margin ?? 0));
     }
 }

@@ -425,8 +425,13 @@ export class Scene extends Handle<raw.Scene> {
 
     /** Whether N closed segments in the world meet any instance, exactly: 1 or 0 for each. */
     segmentHits(starts: Numbers, ends: Numbers): Uint8Array {
+        return this.visible(starts, ends).map((sees) => 1 - sees);
+    }
+
+    /** Whether the points of N pairs in the world see each other past all instances: see `Mesh.visible`. */
+    visible(starts: Numbers, ends: Numbers, options: { margin?: number } = {}): Uint8Array {
         const [from, to] = [floats(starts, "starts"), floats(ends, "ends")];
-        return this.#call((scene) => scene.segmentHits(from, to));
+        return this.#call((scene) => scene.visible(from, to, options.margin ?? 0));
     }
 }
 

@@ -84,6 +84,7 @@ __all__ = [
     "sides",
     "signed_distance",
     "signed_point_distances",
+    "visible",
     "voxels_core",
     "within",
 ]
@@ -337,6 +338,9 @@ def all_hits(
 ) -> Any: ...
 def segment_hits(
     of: _Of, starts: ArrayLike, ends: ArrayLike
+) -> Any: ...
+def visible(
+    of: _Of, points_a: ArrayLike, points_b: ArrayLike, margin: float
 ) -> Any: ...
 def scene_collide(scene: Scene) -> bool: ...
 def scene_within(scene: Scene, d: float) -> bool: ...

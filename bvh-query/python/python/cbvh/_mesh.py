@@ -611,6 +611,25 @@ class Mesh:
         """
         return _cbvh.segment_hits((self._mesh, pose, parallel), starts, ends)
 
+    def visible(
+        self,
+        points_a: ArrayLike,
+        points_b: ArrayLike,
+        *,
+        margin: float = 0.0,
+        pose: ArrayLike | None = None,
+        parallel: bool = False,
+    ) -> Any:
+        """Whether points see each other past the surface: bool, or an array of shape (N,).
+
+        ``points_a`` and ``points_b`` have shape (3,) or (N, 3), and one of either serves N of the other. Two points see each other
+        if the segment between them, but for what is within ``margin`` mesh units of either, does not meet the surface. With a
+        margin of 0 a point on the surface sees nothing, as the segment touches the surface there. For such points take a margin
+        that is longer than their coordinates are off, such as a millionth of the size of the mesh, or move them off the surface.
+        Points at most two margins apart see each other. ``pose``: of this mesh in the frame of the points (body to world).
+        """
+        return _cbvh.visible((self._mesh, pose, parallel), points_a, points_b, margin)
+
 
 def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
     """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size.

@@ -538,6 +538,11 @@ class Scene:
         """Whether closed segments in the world meet any instance, exactly: bool, or an array of shape (N,)."""
         return _cbvh.segment_hits(self._scene, starts, ends)
 
+    def visible(self, points_a: ArrayLike, points_b: ArrayLike, *, margin: float = 0.0) -> Any:
+        """Whether points in the world see each other past all instances: bool, or an array of shape (N,). Arguments are those of
+        `Mesh.visible`."""
+        return _cbvh.visible(self._scene, points_a, points_b, margin)
+
     def motion(
         self, paths: Mapping[int | str, Path], *, clearance: float = 0.0, tolerance: float | None = None
     ) -> SceneMotionAnswer:

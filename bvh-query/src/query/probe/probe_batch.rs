@@ -12,7 +12,7 @@ use crate::query::probe::line::LineQuestion;
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
 use crate::query::probe::ray::{All, Any, First, Ray, RayHit, Scaled};
-use crate::query::probe::segment::MeetsSegment;
+use crate::query::probe::segment::{MeetsSegment, check_margin};
 use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
 use std::convert::Infallible;
@@ -127,14 +127,23 @@ impl<'a> ProbeBatch<'a> {
     /// # Errors
     /// The error of the first segment that fails.
     pub fn segment_hits(&self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, QueryError> {
-        let line = |[from, to]: &[[f64; 3]; 2]| [*from, [0, 1, 2].map(|k| to[k] - from[k])];
         self.each_line(
             segments,
-            line,
+            of_segment,
             |[from, to]| Ok([check_point(from)?, check_point(to)?]),
             MeetsSegment::about,
             |segment| segment.met,
         )
+    }
+
+    /// Answers [`Querier::visible`] for the two points of each pair.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the margin is negative or not finite; else the error of the first pair that fails.
+    pub fn visible(&self, pairs: &[[[f64; 3]; 2]], margin: f64) -> Result<Vec<bool>, QueryError> {
+        check_margin(margin)?;
+        let read = |[from, to]: &[[f64; 3]; 2]| MeetsSegment::without_ends(*from, *to, margin);
+        self.each_line(pairs, of_segment, read, |question| question, |question| !question.met)
     }
 
     /// Asks about each probe, in the order of their places along the curve.
@@ -279,6 +288,11 @@ impl<R> Run<R> {
 /// Returns the origin and the direction of a ray.
 fn of_ray(ray: &Ray) -> [[f64; 3]; 2] {
     [ray.origin, ray.direction]
+}
+
+/// Returns the start of a segment, and what leads to its end.
+fn of_segment([from, to]: &[[f64; 3]; 2]) -> [[f64; 3]; 2] {
+    [*from, [0, 1, 2].map(|k| to[k] - from[k])]
 }
 
 /// Returns the numbers of lines in an order in which neighbours meet the same parts of a shape: by the signs of their directions, and

@@ -1,6 +1,6 @@
-//! Whether a segment meets a mesh.
+//! Whether a segment meets a mesh, and whether two points see each other past it.
 
-use crate::error::QueryError;
+use crate::error::{NumberError, QueryError};
 use crate::narrow::{Point, segment_intersects, triangle_distance, triangles_within};
 use crate::query::probe::line::{Candidate, Line, LineQuestion};
 use crate::query::probe::placed::PlacedShape;
@@ -28,11 +28,42 @@ impl Querier {
         self.ask_line(&shape.into(), &mut question)?;
         Ok(question.met)
     }
+
+    /// Returns whether two points see each other: whether no part of the segment between them, but for what is within `margin` of
+    /// either of them, meets a mesh.
+    ///
+    /// With a margin of 0, this is the opposite of [`Querier::segment_hit`]: a point on the mesh sees nothing, as the segment touches
+    /// the mesh there. For points on a surface, take a margin, in mesh units, that is longer than their coordinates are off and shorter
+    /// than gaps that matter, such as a millionth of the size of the mesh; it is measured along the segment. Points that are at most
+    /// two margins apart see each other. The ends of what is left of the segment are rounded to nearest, and the decision about it is
+    /// exact. Cost: about a microsecond.
+    ///
+    /// # Errors
+    /// [`QueryError::Number`] if the margin is negative or not finite; else the errors of [`Querier::segment_hit`].
+    pub fn visible<'a>(
+        &mut self,
+        shape: impl Into<PlacedShape<'a>>,
+        from: [f64; 3],
+        to: [f64; 3],
+        margin: f64,
+    ) -> Result<bool, QueryError> {
+        let mut question = MeetsSegment::without_ends(from, to, check_margin(margin)?)?;
+        self.start();
+        self.ask_line(&shape.into(), &mut question)?;
+        Ok(!question.met)
+    }
+}
+
+/// Refuses an invalid margin.
+pub(crate) fn check_margin(margin: f64) -> Result<f64, QueryError> {
+    if (0.0..f64::INFINITY).contains(&margin) { Ok(margin) } else { Err(NumberError::Margin(margin).into()) }
 }
 
 /// Does any triangle meet the segment?
 pub(crate) struct MeetsSegment {
     ends: [Point; 2],
+    /// Nothing is left of the segment.
+    is_empty: bool,
     pub(crate) met: bool,
 }
 
@@ -42,9 +73,27 @@ impl MeetsSegment {
         Ok(Self::about([check_point(&from)?, check_point(&to)?]))
     }
 
+    /// The question about what is left of a segment without what is within a margin of its ends.
+    pub(crate) fn without_ends(from: Point, to: Point, margin: f64) -> Result<Self, QueryError> {
+        let whole = Self::new(from, to)?;
+        if margin == 0.0 {
+            return Ok(whole);
+        }
+        let vector = [0, 1, 2].map(|k| to[k] - from[k]);
+        let largest = vector.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        // Squares of the shares of the largest component neither over- nor underflow in a way that matters.
+        let length = largest * vector.map(|v| (v / largest).powi(2)).iter().sum::<f64>().sqrt();
+        // Two equal points have no length that is a number.
+        let is_empty = length.is_nan() || length <= 2.0 * margin;
+        let moved = |end: Point, share: f64| [0, 1, 2].map(|k| end[k] + share * vector[k]);
+        let ends =
+            if is_empty { [from; 2] } else { [moved(from, margin / length), moved(to, -margin / length)] };
+        Ok(Self { ends, is_empty, met: false })
+    }
+
     #[inline(always)]
     pub(super) fn about(ends: [Point; 2]) -> Self {
-        Self { ends, met: false }
+        Self { ends, is_empty: false, met: false }
     }
 }
 
@@ -55,7 +104,7 @@ impl LineQuestion for MeetsSegment {
 
     #[inline(always)]
     fn limit(&self) -> f64 {
-        if self.met { -1.0 } else { 1.0 }
+        if self.met || self.is_empty { -1.0 } else { 1.0 }
     }
 
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {

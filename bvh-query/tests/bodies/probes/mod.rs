@@ -10,3 +10,4 @@ mod ray_tree;
 mod rays;
 mod relations;
 mod sides;
+mod visible;

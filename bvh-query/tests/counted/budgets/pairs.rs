@@ -103,7 +103,7 @@ fn each_probe_question(a: &Bvh, budget: u64, mut check: impl FnMut(&str, AskPair
     let mut batch = ProbeBatch::new(a).unwrap();
     batch.set_budget(budget);
     let batch = &batch;
-    let asks: [(&str, AskPair<'_>); 14] = [
+    let asks: [(&str, AskPair<'_>); 16] = [
         ("closest_point", &|q| text(q.closest_point(a, point, far))),
         ("side", &|q| text(q.side(a, point))),
         ("signed_point_distance", &|q| text(q.signed_point_distance(a, point, far))),
@@ -118,6 +118,8 @@ fn each_probe_question(a: &Bvh, budget: u64, mut check: impl FnMut(&str, AskPair
         ("ProbeBatch::any_hits", &|_| text(batch.any_hits(&[ray]))),
         ("ProbeBatch::all_hits", &|_| text(batch.all_hits(&[ray]))),
         ("ProbeBatch::segment_hits", &|_| text(batch.segment_hits(&[[from, to]]))),
+        ("visible", &|q| text(q.visible(a, from, to, 0.1))),
+        ("ProbeBatch::visible", &|_| text(batch.visible(&[[from, to]], 0.1))),
     ];
     for (name, ask) in asks {
         check(name, ask);

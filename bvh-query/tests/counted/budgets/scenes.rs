@@ -22,7 +22,7 @@ fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&s
         paths.iter().map(|&(id, path)| (id, path as &(dyn RigidPath + Sync))).collect();
     let options = &MotionOptions::new();
     let (point, ray) = ([0.1, 0.2, 0.3], Ray::new([0.1, 0.2, -3.0], [0.3, 0.2, 1.0]));
-    let asks: [(&str, AskScene<'_>); 17] = [
+    let asks: [(&str, AskScene<'_>); 18] = [
         ("collide", &|s| text(s.collide())),
         ("within", &|s| text(s.within(0.01))),
         ("pairs_in_contact", &|s| text(s.pairs_in_contact())),
@@ -39,6 +39,7 @@ fn each_scene_question(paths: &[(InstanceId, &Motion)], mut check: impl FnMut(&s
         ("any_hits", &|s| text(s.any_hits(&[ray]))),
         ("all_hits", &|s| text(s.all_hits(&[ray]))),
         ("segment_hits", &|s| text(s.segment_hits(&[[[9.0; 3], point]]))),
+        ("visible", &|s| text(s.visible(&[[[9.0; 3], point]], 0.1))),
         ("visit_contacts", &|s| {
             let mut all = Vec::new();
             s.visit_contacts(|pair, contacts| {
