@@ -9,11 +9,11 @@
 
 use super::within::ray_within;
 use super::{
-    Closest, Crossing, Point, Ray, Triangle, dot, point_distance, subtract, triangle_distance,
+    Closest, Crossing, Point, Ray, Triangle, cross, dot, point_distance, subtract, triangle_distance,
     triangles_within,
 };
 use crate::isa::scalar::Scalar;
-use crate::numerics::UNIT_ROUNDOFF;
+use crate::numerics::{SLACK, UNIT_ROUNDOFF};
 
 /// How often an interval of the parameter is halved: more often than an f64 has digits.
 const HALVINGS: u32 = 64;
@@ -58,7 +58,7 @@ impl<'a> RoundedRay<'a> {
 
     /// Returns whether a ray, whose parameter goes up to `until`, comes within the radius, exactly.
     pub(crate) fn is_met(&self, until: f64) -> bool {
-        self.starts_inside() || self.is_hit(until, self.end().min(until))
+        self.nearest().is_some_and(|nearest| self.is_hit((until, self.end().min(until)), nearest))
     }
 
     /// Returns where a ray, whose parameter goes up to `until`, first comes within the radius. Whether it does is exact.
@@ -117,13 +117,45 @@ impl<'a> RoundedRay<'a> {
         value.lower > self.radius && value.slope > value.slope_error
     }
 
+    /// Returns whether the ray enters after a parameter, by so much that the halving of an interval would not find it earlier either.
+    /// So it does not matter whether it is left out, nor in which order others were found.
+    ///
+    /// Before a parameter at which the distance decreases, it is larger, and decreases faster. Its bounds there are off by at most three
+    /// times as much, as the magnitudes that they are proportional to are at most twice as large, plus the triangle's.
+    pub(crate) fn enters_after(&self, t: f64) -> bool {
+        let value = self.value(t);
+        value.lower - 4.0 * (value.upper - value.lower) > self.radius
+            && value.slope < -4.0 * value.slope_error
+    }
+
+    /// Returns whether the line of the ray certainly passes by a ball around the triangle and its radius; and else a parameter near the
+    /// middle of the triangle.
+    ///
+    /// The vector from the origin to the middle is rounded by a few units of the magnitudes, and so is the gap from the line.
+    fn nearest(&self) -> Option<f64> {
+        let Ray { origin, direction } = self.ray;
+        let [a, b, c] = self.triangle;
+        let middle = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+        let from = subtract(middle, *origin);
+        let squared = |v: Point| dot(v, v);
+        let ball = self.triangle.iter().map(|corner| squared(subtract(*corner, middle))).fold(0.0, f64::max);
+        let magnitude = self.magnitude + origin.iter().map(|x| x.abs()).sum::<f64>();
+        let reach = (ball.sqrt() + self.radius) * (1.0 + SLACK) + SLACK * magnitude;
+        let along = squared(*direction);
+        let is_past = squared(cross(from, *direction)) > along * reach * reach * (1.0 + SLACK);
+        (!is_past).then(|| dot(from, *direction) / along)
+    }
+
     fn starts_inside(&self) -> bool {
         let start = point_distance(Scalar, self.triangle, self.ray.origin);
         triangles_within(self.triangle, &[self.ray.origin; 3], &start, self.radius)
     }
 
     /// Returns whether the ray comes within the radius, exactly. The part up to `end` decides.
-    fn is_hit(&self, until: f64, end: f64) -> bool {
+    fn is_hit(&self, (until, end): (f64, f64), nearest: f64) -> bool {
+        if self.value(nearest.clamp(0.0, end)).upper <= self.radius {
+            return true;
+        }
         let last = self.point(end);
         let closest = triangle_distance(self.triangle, &[self.ray.origin, last, last]);
         let error = self.error(end, &last);
@@ -159,10 +191,11 @@ impl<'a> RoundedRay<'a> {
     /// Finds some of the ray that is within the radius, up to a parameter `until`.
     fn find(&self, until: f64) -> Option<Found> {
         let end = self.end().min(until);
+        let nearest = self.nearest()?;
         if self.starts_inside() {
             return Some(Found { at: 0.0, is_graze: false, before: 0.0, behind: end });
         }
-        if !self.is_hit(until, end) {
+        if !self.is_hit((until, end), nearest) {
             return None;
         }
         if self.value(end).upper <= self.radius {

@@ -10,7 +10,8 @@
 //! outward by w = 3 u (|n p| + |n q|) + 8 E, more than twice as much. The remaining errors are relative: a rounded
 //! difference, a rounded inverse and a product make an end of the interval wrong by 3u of itself. To cover this,
 //! entries are made less, and exits greater, by 8u. The signs are right, so this also holds for ends before the
-//! segment's start, which count as 0.
+//! segment's start, which count as 0. Where shapes reach r around their triangles, slabs are first moved by 2 r, which is more than a
+//! direction of three entries needs, and of which w has 3u more.
 //!
 //! If |n q| is less than w / 2, slabs are moved by |n q| more, and n q counts as w / 2. Wherever the segment meets the
 //! slab, both ends are then at least w - w / 2 away, and the quotients are beyond 0 and 1.
@@ -29,6 +30,8 @@ pub(crate) struct Segment {
     pub(crate) vector: [f64; 3],
     /// A bound on the error of the coordinates of its points.
     pub(crate) error: f64,
+    /// How far around its triangles the object reaches.
+    pub(crate) reach: f64,
 }
 
 /// A segment as node tests need it, by rows of slabs, in all four columns.
@@ -50,15 +53,16 @@ impl LineFilter {
         let (start, vector) = (&segment.start, &segment.vector);
         // A projection is off by up to three times the error of a coordinate, for which less than half is needed.
         let least = 8.0 * segment.error + f64::from(f32::MIN_POSITIVE);
+        let reach = 2.0 * segment.reach;
         for row in 0..16 {
             let p = x[row] * start[0] + y[row] * start[1] + z[row] * start[2];
             let q = x[row] * vector[0] + y[row] * vector[1] + z[row] * vector[2];
-            let outward = 3.0 * f64::from(U) * (p.abs() + q.abs()) + least;
+            let outward = 3.0 * f64::from(U) * (p.abs() + q.abs() + reach) + least;
             let is_along = q.abs() < 0.5 * outward;
             let q_or_least = if is_along { 0.5 * outward } else { q };
             let outward = if is_along { outward + q.abs() } else { outward };
-            above[row] = (p + outward) as f32;
-            below[row] = (p - outward) as f32;
+            above[row] = (p + (outward + reach)) as f32;
+            below[row] = (p - (outward + reach)) as f32;
             inverse[row] = (1.0 / q_or_least) as f32;
         }
         // Segments are in rows without a slab from -infinity to infinity.

@@ -15,7 +15,8 @@
 //! Error, with u = 2^-24: let the points of the line be off by e. Boxes are moved outward by w = 3u |p| + 8e, which is more than twice
 //! what rounding p and w to f32 takes and e. The remaining errors are relative: a rounded difference, a rounded inverse and a product
 //! make an end of the interval wrong by 3u of itself. To cover this, entries are made less, and exits greater, by 8u, which is part of
-//! the inverse. The signs are right, so this also holds for ends before the start, which count as 0.
+//! the inverse. The signs are right, so this also holds for ends before the start, which count as 0. Where shapes reach r around their
+//! triangles, boxes are first moved by r, of which w has 3u more.
 //!
 //! An inverse beyond the range of f32 is the largest f32, or infinite. Where the line is within the slab of an axis by w / 2 or more, the
 //! exit is then beyond all t that matter: w is at least the least normal f32, and t goes up to 1, or w is at least 2^-44 of the size of
@@ -50,9 +51,9 @@ pub(crate) struct BoxFilter {
 
 impl BoxFilter {
     /// The line through a point around the object's origin, whose points are off by `error` and go up to a parameter `end`. `inverse` has
-    /// the inverses of the components of its direction.
+    /// the inverses of the components of its direction. The object reaches so far around its triangles.
     #[inline(always)]
-    pub(crate) fn new(point: &[f64; 3], inverse: &[f64; 3], error: f64, end: f32) -> Self {
+    pub(crate) fn new(point: &[f64; 3], inverse: &[f64; 3], [error, reach]: [f64; 2], end: f32) -> Self {
         /// 8u.
         const SLACK: f64 = 1.0 / (1 << 21) as f64;
         let least = 8.0 * error + f64::from(f32::MIN_POSITIVE);
@@ -60,7 +61,7 @@ impl BoxFilter {
         let (mut subtracted, mut of_one) = ([[0.0; 2]; 3], [[0.0; 2]; 3]);
         for axis in 0..3 {
             let (p, most) = (point[axis], f64::from(f32::MAX));
-            let outward = 3.0 * f64::from(U) * p.abs() + least;
+            let outward = 3.0 * f64::from(U) * (p.abs() + reach) + least + reach;
             let ends = [(p + outward) as f32, (p - outward) as f32];
             let inverse = inverse[axis].clamp(-most, most);
             let descends = usize::from(inverse < 0.0);

@@ -135,9 +135,9 @@ impl Clipped {
         // A point of the line in the box is at most twice as far along it as the magnitudes of both add up to.
         let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin) + radius));
         // A pose may stretch: see `closest`.
-        let error = error + radius * MAX_STRETCH;
+        let reach = radius * MAX_STRETCH;
         let inverse = direction.map(|v| 1.0 / v);
-        let [start, end] = range_in_box(&origin, (&direction, &inverse), &into.bounds, error)?;
+        let [start, end] = range_in_box(&origin, (&direction, &inverse), &into.bounds, error + reach)?;
         let (start, end) = (start.max(0.0), end.min(limit));
         if start > end {
             return None;
@@ -148,6 +148,7 @@ impl Clipped {
                 start: [0, 1, 2].map(|k| origin[k] + start * direction[k]),
                 vector: direction.map(|v| length * v),
                 error: 2.0 * error,
+                reach,
             },
             direction,
             inverse,
@@ -175,14 +176,14 @@ impl Clipped {
         }
         // As in `new`.
         let error = into.error(4.0 * (line.magnitude + sum_of_magnitudes(&origin) + radius));
-        let error = error + radius * MAX_STRETCH;
+        let reach = radius * MAX_STRETCH;
         let inverse = direction.map(|v| 1.0 / v);
-        let [start, end] = range_in_box(&origin, (&direction, &inverse), &into.bounds, error)?;
+        let [start, end] = range_in_box(&origin, (&direction, &inverse), &into.bounds, error + reach)?;
         if end < 0.0 || start > limit {
             return None;
         }
         Some(Self {
-            segment: Segment { start: origin, vector: direction, error: 2.0 * error },
+            segment: Segment { start: origin, vector: direction, error: 2.0 * error, reach },
             direction,
             inverse,
             start: 0.0,

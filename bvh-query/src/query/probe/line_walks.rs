@@ -197,13 +197,18 @@ impl Task for AskTree<'_> {
         let mut room = Packet::NONE;
         while let Some(posed) = questions.next() {
             let Some(of) = Asked::new(placed, index, (into, true), posed, stats) else { continue };
-            let Clipped { segment: Segment { start, error, .. }, direction, inverse, inverse_length, .. } =
-                &of.clipped;
+            let Clipped {
+                segment: Segment { start, error, reach, .. },
+                direction,
+                inverse,
+                inverse_length,
+                ..
+            } = &of.clipped;
             let shear = LineShear::new(start, (direction, inverse), *error, farthest(start, &into.bounds));
             let along = inverse.map(|v| v * inverse_length);
             // Entries may exceed the end of a segment by rounding.
             let end = if of.clipped.whole == 2.0 { 1.0 + 1.0 / (1 << 20) as f32 } else { f32::INFINITY };
-            let filter = BoxFilter::new(start, &along, *error, end);
+            let filter = BoxFilter::new(start, &along, [*error, *reach], end);
             let mut visitor = AlongTree { of, tree, shear, room: &mut room };
             let tests = memory.ray_walk(tree, filter, &mut visitor).run(isa)?;
             visitor.of.stats.node_tests += tests;

@@ -259,6 +259,12 @@ impl First {
         Some((best.crossing.t * self.ray.unit, narrow::unit_normal(&best.triangle)))
     }
 
+    /// Returns whether a triangle with a radius is certainly met after what was found.
+    fn enters_later(&self, Candidate { triangle, radius, .. }: &Candidate<'_>) -> bool {
+        let limit = self.limit();
+        limit < self.ray.until && RoundedRay::new(&self.ray.ray, triangle, *radius).enters_after(limit)
+    }
+
     /// Returns the parameter of the first hit if the ray leaves the triangle on the side that its normal points to.
     pub(crate) fn way_out(&self) -> Option<f64> {
         let (t, normal) = self.met()?;
@@ -278,6 +284,9 @@ impl LineQuestion for First {
     }
 
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError> {
+        if candidate.radius > 0.0 && self.enters_later(candidate) {
+            return Ok(());
+        }
         let Some(crossing) = self.ray.crossing(candidate) else { return Ok(()) };
         if candidate.radius > 0.0 {
             let found = Met::new(crossing, candidate)?;
