@@ -79,7 +79,8 @@ impl Ray {
     ///
     /// The answer is exact. Touching in a vertex, along an edge or in a plane counts. A triangle without area is the segment
     /// or point that its corners span.
-    #[inline(always)]
+    // Pages load one copy for all questions.
+    #[cfg_attr(not(all(target_arch = "wasm32", target_os = "unknown")), inline(always))]
     pub(crate) fn crossing(&self, triangle: &Triangle) -> Option<Crossing> {
         self.crossing_within(triangle, DOUBT)
     }

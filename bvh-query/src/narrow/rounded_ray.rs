@@ -147,8 +147,7 @@ impl<'a> RoundedRay<'a> {
     }
 
     fn starts_inside(&self) -> bool {
-        let start = point_distance(Scalar, self.triangle, self.ray.origin);
-        triangles_within(self.triangle, &[self.ray.origin; 3], &start, self.radius)
+        triangles_within(self.triangle, &[self.ray.origin; 3], &self.value(0.0).closest, self.radius)
     }
 
     /// Returns whether the ray comes within the radius, exactly. The part up to `end` decides.
@@ -225,6 +224,7 @@ impl<'a> RoundedRay<'a> {
     }
 
     /// Returns an end of the interval, given a parameter outside on its side.
+    #[inline(never)]
     fn end_of(&self, found: &Found, outside: f64) -> Crossing {
         if found.is_graze {
             return Crossing::around(found.at, found.before, found.behind);

@@ -58,12 +58,14 @@ impl Stay {
 ///
 /// The order of the triangles does not matter. Cost: a few microseconds per triangle, and much less for those which are between the
 /// ends of what is known already, as they are taken in the order along the ray.
-pub(super) fn ends(ray: &Ray, until: f64, met: &mut [Rounded]) -> Vec<(Crossing, Numbers)> {
-    met.sort_unstable_by(|x, y| {
-        x.numbers.0.cmp(&y.numbers.0).then(x.along.total_cmp(&y.along)).then(x.numbers.cmp(&y.numbers))
-    });
+pub(super) fn ends(ray: &Ray, until: f64, met: &[Rounded]) -> Vec<(Crossing, Numbers)> {
     let mut stays: Vec<Stay> = Vec::new();
-    for &Rounded { ref triangle, radius, numbers, .. } in &*met {
+    let key = |of: &Rounded| {
+        let (instance, object, triangle) = of.numbers;
+        (u64::from(instance) << 32 | u64::from(object), of.along, triangle)
+    };
+    for at in in_order(met.iter().map(key).collect()) {
+        let &Rounded { ref triangle, radius, numbers, .. } = &met[at];
         let rounded = RoundedRay::new(ray, triangle, radius);
         let known = stays.last_mut().filter(|known| known.entry.1.0 == numbers.0);
         if known.as_ref().is_some_and(|known| rounded.is_between(known.entry.0.upper, known.exit.0.lower)) {
@@ -76,16 +78,29 @@ pub(super) fn ends(ray: &Ray, until: f64, met: &mut [Rounded]) -> Vec<(Crossing,
             _ => stays.push(stay),
         }
     }
-    stays.sort_by(|x, y| x.entry.1.0.cmp(&y.entry.1.0).then(x.entry.0.lower.total_cmp(&y.entry.0.lower)));
-    stays.dedup_by(|later, earlier| {
-        let meets = earlier.may_meet(later);
-        if meets {
-            earlier.join(later);
+    let key = |stay: &Stay| (stay.entry.1.0.into(), stay.entry.0.lower, 0);
+    let mut joined: Vec<Stay> = Vec::new();
+    for at in in_order(stays.iter().map(key).collect()) {
+        match joined.last_mut() {
+            Some(earlier) if earlier.may_meet(&stays[at]) => earlier.join(&stays[at]),
+            _ => joined.push(stays[at]),
         }
-        meets
-    });
-    let ends = stays.iter().flat_map(|stay| [stay.entry, stay.exit]);
-    let mut ends: Vec<_> = ends.filter(|(crossing, _)| crossing.t <= until).collect();
-    ends.sort_by(|x, y| x.0.t.total_cmp(&y.0.t));
-    ends
+    }
+    let ends = joined.iter().flat_map(|stay| [stay.entry, stay.exit]);
+    let ends: Vec<_> = ends.filter(|(crossing, _)| crossing.t <= until).collect();
+    // At equal parameters, an entry stays before its exit.
+    let order = in_order(ends.iter().map(|(crossing, _)| (0, crossing.t, 0)).collect());
+    order.into_iter().map(|at| ends[at]).collect()
+}
+
+/// Returns the places of keys in ascending order, equal ones as they come. The library has this sort of three words already: pages need
+/// not load another one.
+#[inline(never)]
+fn in_order(keys: Vec<(u64, f64, u32)>) -> Vec<usize> {
+    // In the order of `f64::total_cmp`.
+    let ascending = |x: f64| x.to_bits() ^ (((x.to_bits() as i64 >> 63) as u64) | 1 << 63);
+    let words = |((first, x, last), at)| [first, ascending(x), u64::from(last) << 32 | at];
+    let mut words: Vec<[u64; 3]> = keys.into_iter().zip(0..).map(words).collect();
+    words.sort_unstable();
+    words.into_iter().map(|[.., last]| last as u32 as usize).collect()
 }
