@@ -369,19 +369,20 @@ impl All {
         let Self { ray, met, rounded } = self;
         met.sort_unstable_by(|x, y| x.compare(ray, y).then(x.numbers.cmp(&y.numbers)));
         met.dedup_by(|later, earlier| later.compare(ray, earlier).is_eq());
+        if rounded.is_empty() {
+            return met.iter().map(|of| ray.hit(&of.crossing, of.numbers)).collect();
+        }
         let mut ends = ends(&ray.ray, ray.until, rounded).into_iter().peekable();
         let mut hits = Vec::with_capacity(met.len() + ends.len());
         for of in met.iter() {
-            let earlier = |(crossing, numbers): &(Crossing, Numbers)| {
-                (crossing.t, *numbers) < (of.crossing.t, of.numbers)
-            };
-            while let Some((crossing, numbers)) = ends.next_if(earlier) {
-                hits.push(ray.hit(&crossing, numbers));
+            let of = (of.crossing, of.numbers);
+            while let Some(end) = ends.next_if(|end| (end.0.t, end.1) < (of.0.t, of.1)) {
+                hits.push(end);
             }
-            hits.push(ray.hit(&of.crossing, of.numbers));
+            hits.push(of);
         }
-        hits.extend(ends.map(|(crossing, numbers)| ray.hit(&crossing, numbers)));
-        hits
+        hits.extend(ends);
+        hits.iter().map(|(crossing, numbers)| ray.hit(crossing, *numbers)).collect()
     }
 }
 

@@ -60,11 +60,11 @@ impl Stay {
 /// ends of what is known already, as they are taken in the order along the ray.
 pub(super) fn ends(ray: &Ray, until: f64, met: &[Rounded]) -> Vec<(Crossing, Numbers)> {
     let mut stays: Vec<Stay> = Vec::new();
-    let key = |of: &Rounded| {
+    let words = |(at, of): (usize, &Rounded)| {
         let (instance, object, triangle) = of.numbers;
-        (u64::from(instance) << 32 | u64::from(object), of.along, triangle)
+        key(u64::from(instance) << 32 | u64::from(object), of.along, u64::from(triangle) << 32 | at as u64)
     };
-    for at in in_order(met.iter().map(key).collect()) {
+    for at in in_order(met.iter().enumerate().map(words).collect()) {
         let &Rounded { ref triangle, radius, numbers, .. } = &met[at];
         let rounded = RoundedRay::new(ray, triangle, radius);
         let known = stays.last_mut().filter(|known| known.entry.1.0 == numbers.0);
@@ -78,9 +78,9 @@ pub(super) fn ends(ray: &Ray, until: f64, met: &[Rounded]) -> Vec<(Crossing, Num
             _ => stays.push(stay),
         }
     }
-    let key = |stay: &Stay| (stay.entry.1.0.into(), stay.entry.0.lower, 0);
+    let words = |(at, stay): (usize, &Stay)| key(stay.entry.1.0.into(), stay.entry.0.lower, at as u64);
     let mut joined: Vec<Stay> = Vec::new();
-    for at in in_order(stays.iter().map(key).collect()) {
+    for at in in_order(stays.iter().enumerate().map(words).collect()) {
         match joined.last_mut() {
             Some(earlier) if earlier.may_meet(&stays[at]) => earlier.join(&stays[at]),
             _ => joined.push(stays[at]),
@@ -89,18 +89,17 @@ pub(super) fn ends(ray: &Ray, until: f64, met: &[Rounded]) -> Vec<(Crossing, Num
     let ends = joined.iter().flat_map(|stay| [stay.entry, stay.exit]);
     let ends: Vec<_> = ends.filter(|(crossing, _)| crossing.t <= until).collect();
     // At equal parameters, an entry stays before its exit.
-    let order = in_order(ends.iter().map(|(crossing, _)| (0, crossing.t, 0)).collect());
-    order.into_iter().map(|at| ends[at]).collect()
+    let words = |(at, end): (usize, &(Crossing, Numbers))| key(0, end.0.t, at as u64);
+    in_order(ends.iter().enumerate().map(words).collect()).map(|at| ends[at]).collect()
 }
 
-/// Returns the places of keys in ascending order, equal ones as they come. The library has this sort of three words already: pages need
-/// not load another one.
-#[inline(never)]
-fn in_order(keys: Vec<(u64, f64, u32)>) -> Vec<usize> {
-    // In the order of `f64::total_cmp`.
-    let ascending = |x: f64| x.to_bits() ^ (((x.to_bits() as i64 >> 63) as u64) | 1 << 63);
-    let words = |((first, x, last), at)| [first, ascending(x), u64::from(last) << 32 | at];
-    let mut words: Vec<[u64; 3]> = keys.into_iter().zip(0..).map(words).collect();
-    words.sort_unstable();
-    words.into_iter().map(|[.., last]| last as u32 as usize).collect()
+/// A key of three words: a number, another one in the order of `f64::total_cmp`, and a place in the lower half of the last word.
+fn key(first: u64, x: f64, last: u64) -> [u64; 3] {
+    [first, x.to_bits() ^ (((x.to_bits() as i64 >> 63) as u64) | 1 << 63), last]
+}
+
+/// Returns the places in keys in their ascending order. The library has this sort already: pages need not load another one.
+fn in_order(mut keys: Vec<[u64; 3]>) -> impl Iterator<Item = usize> {
+    keys.sort_unstable();
+    keys.into_iter().map(|[.., last]| last as u32 as usize)
 }
