@@ -79,8 +79,7 @@ impl Ray {
     ///
     /// The answer is exact. Touching in a vertex, along an edge or in a plane counts. A triangle without area is the segment
     /// or point that its corners span.
-    // Pages load one copy for all questions.
-    #[cfg_attr(not(all(target_arch = "wasm32", target_os = "unknown")), inline(always))]
+    #[inline(always)]
     pub(crate) fn crossing(&self, triangle: &Triangle) -> Option<Crossing> {
         self.crossing_within(triangle, DOUBT)
     }
@@ -94,7 +93,8 @@ impl Ray {
     }
 
     /// Does what `crossing` does, where so much of the parameter may be in doubt.
-    #[inline(always)]
+    // Pages load one copy for all questions.
+    #[cfg_attr(not(all(target_arch = "wasm32", target_os = "unknown")), inline(always))]
     fn crossing_within(&self, triangle: &Triangle, doubt: f64) -> Option<Crossing> {
         let seen = self.seen(triangle);
         let mut sides = [0.0; 3];

@@ -99,7 +99,7 @@ impl Scene {
         let to = Attached { parent: above, kept: kept.to_keep() };
         let before = self.contents_mut().attach(own, Some(to));
         match self.contents.moves_of(own) {
-            Ok(moves) => self.contents_mut().carry_out(moves),
+            Ok(moves) => self.contents_mut().carry_out(&moves),
             Err(refused) => {
                 self.contents_mut().attach(own, before);
                 return Err(refused);
@@ -223,13 +223,14 @@ impl Contents {
     }
 
     /// Moves instances.
-    pub(super) fn carry_out(&mut self, moves: Vec<Move>) {
-        let moves = moves.into_iter().map(|Move { place, world, kept }| (place, (world, kept)));
-        self.change_each(moves, |instance, (world, kept)| {
-            instance.world = world;
-            if let Some((attached, kept)) = instance.attached.as_mut().zip(kept) {
+    pub(super) fn carry_out(&mut self, moves: &[Move]) {
+        let poses: Vec<(u32, Pose)> = moves.iter().map(|of| (of.place, of.world)).collect();
+        self.place_each(&poses);
+        for Move { place, kept, .. } in moves {
+            let attached = self.at_mut(*place).and_then(|instance| instance.attached.as_mut());
+            if let Some((attached, kept)) = attached.zip(*kept) {
                 attached.kept = kept;
             }
-        });
+        }
     }
 }

@@ -125,18 +125,10 @@ impl Contents {
 
     /// Changes an instance, and its box.
     pub(super) fn change(&mut self, place: u32, change: impl FnOnce(&mut Instance)) {
-        self.change_one(place, change);
-        self.broad.settle();
-    }
-
-    /// Changes some instances, and their boxes. The boxes above them are computed once.
-    pub(super) fn change_each<T>(
-        &mut self,
-        changes: impl IntoIterator<Item = (u32, T)>,
-        mut change: impl FnMut(&mut Instance, T),
-    ) {
-        for (place, to) in changes {
-            self.change_one(place, |instance| change(instance, to));
+        if let Some(instance) = &mut self.instances[place as usize] {
+            change(instance);
+            instance.update_bounds();
+            self.broad.set_box(instance.item(place));
         }
         self.broad.settle();
     }
@@ -152,15 +144,6 @@ impl Contents {
             }
         }
         self.broad.settle();
-    }
-
-    /// Changes an instance, and its box, but not the boxes above.
-    fn change_one(&mut self, place: u32, change: impl FnOnce(&mut Instance)) {
-        if let Some(instance) = &mut self.instances[place as usize] {
-            change(instance);
-            instance.update_bounds();
-            self.broad.set_box(instance.item(place));
-        }
     }
 
     pub(super) fn set_groups(&mut self, place: u32, groups: Groups) {

@@ -351,7 +351,7 @@ impl Scene {
             self.contents_mut().place_each(poses);
         } else {
             let moves = self.contents.moves(poses)?;
-            self.contents_mut().carry_out(moves);
+            self.contents_mut().carry_out(&moves);
         }
         Ok(())
     }

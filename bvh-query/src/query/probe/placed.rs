@@ -69,7 +69,8 @@ pub(crate) struct IntoObject {
 }
 
 impl IntoObject {
-    #[inline(always)]
+    // Pages load one copy.
+    #[cfg_attr(not(all(target_arch = "wasm32", target_os = "unknown")), inline(always))]
     pub(crate) fn new(pose: Option<&Pose>, object: &Object) -> Self {
         let (record, origin) = (object.record(), object.origin());
         let mut bounds = [[0.0; 3]; 2];

@@ -124,7 +124,8 @@ impl Node {
 }
 
 /// Combines all lanes, half of them with the other half at a time. Empty lanes change nothing.
-#[inline(always)]
+// Pages load two copies, not six.
+#[cfg_attr(not(all(target_arch = "wasm32", target_os = "unknown")), inline(always))]
 fn fold(mut ends: [f32; WIDTH], less: impl Fn(f32, f32) -> f32) -> f32 {
     fold_half::<8>(&mut ends, &less);
     fold_half::<4>(&mut ends, &less);
