@@ -29,7 +29,8 @@
 //! whether two meshes touch, how far apart they are and whether they are within a distance in less time, for poses that
 //! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
 //! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
-//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`]. Features whose names begin with `__` are
+//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the feature
+//! `serde` serialises poses and plain answers. Features whose names begin with `__` are
 //! not part of the public interface. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
 //! the world, in the world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!

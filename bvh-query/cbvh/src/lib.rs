@@ -14,7 +14,7 @@
 //!
 //! The types are those of the crates, so a program may use this crate beside libraries that use the crates. The feature
 //! `parallel`, on by default, adds rayon: bakes, batches and scenes then use all cores. The feature `mint` makes poses from
-//! the matrices and quaternions of other crates. An application that only opens baked files needs no features:
+//! the matrices and quaternions of other crates, and `serde` serialises poses and answers. An application that only opens baked files needs no features:
 //! `default-features = false`.
 //!
 //! The command `cbvh` is in the package `cbvh-cli`.

@@ -75,3 +75,19 @@ impl Pose {
         Self::new(x, translation)
     }
 }
+
+impl TryFrom<[f64; 12]> for Pose {
+    type Error = PoseError;
+
+    /// Does what [`Pose::from_rows`] does.
+    fn try_from(rows: [f64; 12]) -> Result<Self, PoseError> {
+        Self::from_rows(&rows)
+    }
+}
+
+impl From<Pose> for [f64; 12] {
+    /// Returns the numbers of [`Pose::from_rows`].
+    fn from(Pose { rotation: [x, y, z], translation: t }: Pose) -> Self {
+        [x[0], x[1], x[2], t[0], y[0], y[1], y[2], t[1], z[0], z[1], z[2], t[2]]
+    }
+}

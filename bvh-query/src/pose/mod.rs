@@ -20,7 +20,37 @@ use bvh_format::vec3::dot;
 /// Each coordinate of a placed vertex is the f64 value `((R0 * x + R1 * y) + R2 * z) + t`, where each product and sum
 /// is rounded to nearest and none is fused. Queries are about exactly these points. To keep exact arithmetic within the
 /// range of f64, a rotation entry below 2^-64 in magnitude counts as 0, and so does a translation below 2^-213.
+///
+/// # Other crates
+/// With the feature `mint`, poses come from the matrices and quaternions of crates that convert to those of mint: glam
+/// (`DMat4`, or `DQuat` and `DVec3`) with its feature `mint`, nalgebra (`Matrix4`, such as the result of
+/// `Isometry3::to_homogeneous`) with its feature `convert-mint`, and others. The errors are those of [`Pose::new`].
+///
+#[cfg_attr(feature = "mint", doc = "```")]
+#[cfg_attr(not(feature = "mint"), doc = "```ignore")]
+/// use bvh_query::{Pose, PoseError};
+///
+/// // For glam: `of_matrix(DMat4::from_rotation_translation(rotation, translation))`, `of_parts(rotation, translation)`.
+/// fn of_matrix(matrix: impl Into<mint::ColumnMatrix4<f64>>) -> Result<Pose, PoseError> {
+///     Pose::try_from(matrix.into())
+/// }
+/// fn of_parts(
+///     rotation: impl Into<mint::Quaternion<f64>>,
+///     translation: impl Into<mint::Vector3<f64>>,
+/// ) -> Result<Pose, PoseError> {
+///     Pose::try_from((rotation.into(), translation.into()))
+/// }
+/// let columns = [[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [5.0, 0.0, 0.0, 1.0]];
+/// let quarter_turn = of_matrix(columns)?;
+/// assert_eq!(quarter_turn.place([1.0, 0.0, 0.0]), [5.0, 1.0, 0.0]);
+/// assert_eq!(of_parts([0.0, 0.0, 1.0, 0.0], [5.0, 0.0, 0.0])?.place([1.0, 0.0, 0.0]), [4.0, 0.0, 0.0]);
+/// # Ok::<(), PoseError>(())
+/// ```
+///
+/// With the feature `serde`, a pose is the 12 numbers of [`Pose::from_rows`], and numbers that make no pose are refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "[f64; 12]", into = "[f64; 12]"))]
 pub struct Pose {
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],

@@ -24,6 +24,7 @@ pub(super) type Report<'a> = &'a mut dyn FnMut(Contact, TrianglePair) -> Control
 
 /// A pair of triangles in contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contact {
     /// The number that the object of A has in its file.
     pub object_a: u32,

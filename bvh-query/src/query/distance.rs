@@ -18,6 +18,7 @@ use crate::query::stats::QueryStats;
 /// The least distance of two shapes. For shapes with radii, `triangle_a` and `triangle_b` are those of the cores, and the points
 /// are on the rounded surfaces; where the shapes touch, both are one common point.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Distance {
     /// The distance in mesh units; 0 if and only if the meshes touch.

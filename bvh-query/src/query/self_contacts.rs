@@ -20,6 +20,7 @@ use std::ops::ControlFlow;
 /// Two triangles of one mesh that meet where they should not: see [`Querier::self_contacts`](crate::Querier::self_contacts).
 /// The object and the triangle of A are before those of B.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SelfContact {
     /// The number that the object of the first triangle has in the file.
     pub object_a: u32,

@@ -2,6 +2,7 @@
 
 /// The work of the last query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct QueryStats {
     /// Tests of up to 16 pairs of nodes each.

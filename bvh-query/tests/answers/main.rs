@@ -9,5 +9,7 @@ mod numerics;
 mod oracle;
 mod poses;
 mod self_contacts;
+#[cfg(feature = "serde")]
+mod serialised;
 mod triangles;
 mod turning;

@@ -21,6 +21,7 @@ use crate::query::rounded::{limit_of_cores, sum_of_radii};
 
 /// How two parts lie. The command and the bindings of other languages use its numbers (`class as u8`) and names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum ClashClass {
     /// Their surfaces are farther apart than the clearance and the tolerance, and neither is inside the other.
@@ -80,6 +81,7 @@ impl ClashClass {
 
 /// How two parts lie, and by how much.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Clash {
     /// How they lie.

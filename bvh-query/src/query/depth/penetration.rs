@@ -22,6 +22,7 @@ use bvh_format::vec3::length;
 
 /// How far B moves along a direction until interiors are disjoint.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Separation {
     /// Interiors meet at all shorter moves along the direction, in mesh units.
@@ -34,6 +35,7 @@ pub struct Separation {
 
 /// How deep two shapes overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Penetration {
     /// No shorter translation makes interiors disjoint, in mesh units.

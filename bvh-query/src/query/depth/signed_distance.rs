@@ -18,6 +18,7 @@ use crate::query::tracker::Tracker;
 
 /// How far apart two shapes are or, below zero, how deep they overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SignedDistance {
     /// The signed distance is at least this, in mesh units.

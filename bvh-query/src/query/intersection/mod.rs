@@ -38,6 +38,7 @@ use std::ops::ControlFlow;
 
 /// What two shapes have in common, in mesh units.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Intersection {
     /// The volume of the intersection.

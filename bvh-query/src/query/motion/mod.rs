@@ -82,6 +82,7 @@ impl MotionOptions {
 
 /// Whether a motion is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MotionAnswer {
     /// At no time from 0 to 1 are the meshes within the clearance.
     Free,

@@ -41,6 +41,7 @@ struct BestTriangle {
 
 /// The closest point of a mesh to a given one.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ClosestPoint {
     /// The distance in mesh units; 0 if and only if the given point is on the mesh.

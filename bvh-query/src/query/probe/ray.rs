@@ -36,6 +36,7 @@ impl Ray {
 
 /// Where a ray hits a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct RayHit {
     /// The parameter, in units of the ray's direction; 0 if and only if the ray's origin is on the mesh. Its relative

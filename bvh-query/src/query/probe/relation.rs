@@ -19,6 +19,7 @@ use bvh_format::validate::packets;
 
 /// How two meshes lie. The command and the bindings of other languages use its numbers: `relation as u8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum Relation {
     /// Their surfaces have a point in common: [`Querier::collide`](crate::Querier::collide) is true.

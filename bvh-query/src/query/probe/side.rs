@@ -24,6 +24,7 @@ pub(crate) enum OpenObject {
 
 /// On which side of a mesh a point is. The command and the bindings of other languages use its numbers: `side as i8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(i8)]
 pub enum Side {
     /// The point is neither on the surface nor inside.
@@ -39,6 +40,7 @@ pub enum Side {
 /// The distance of a point from the surface of a mesh, and the side that it is on. Inside overlapping parts of one mesh, the
 /// closest surface may be a face between them: see [`Querier::signed_point_distance`](crate::Querier::signed_point_distance).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SignedPointDistance {
     /// The side of the point.
