@@ -28,7 +28,7 @@ pub enum OpenError {
     },
 }
 
-/// Why a query has no answer. Geometry is never the reason: it is a damaged file, a budget or an invalid number.
+/// Why a query has no answer. Geometry is never the reason: it is a damaged file, a budget, a stop or an invalid number.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QueryError {
@@ -41,6 +41,9 @@ pub enum QueryError {
         /// The budget.
         visits: u64,
     },
+    /// The flag of [`crate::Querier::set_stop`] was set before there was an answer. Nothing is known of it.
+    #[error("expected time for an answer, found the query stopped; clear its flag to query again")]
+    Stopped,
     /// A number given with the question is invalid, such as a distance of NaN.
     #[error(transparent)]
     Number(#[from] NumberError),

@@ -25,6 +25,8 @@ use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 use crate::query::regions::ContactRegions;
 use crate::query::tracker::Tracker;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Asks about many poses or motions of one pair of meshes, on all threads of the rayon pool it is called in.
 ///
@@ -82,6 +84,12 @@ impl<'a> Batch<'a> {
     /// Bounds the work per pose, as [`Querier::set_budget`] does.
     pub fn set_budget(&mut self, visits: u64) {
         self.pool.budget = visits;
+    }
+
+    /// Stops each question when the flag is set, as [`Querier::set_stop`] does. The question then ends with
+    /// [`QueryError::Stopped`], and has no answer for any pose.
+    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+        self.pool.stop = stop;
     }
 
     /// Answers [`Querier::collide`] for each pose.

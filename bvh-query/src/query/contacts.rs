@@ -120,7 +120,7 @@ impl Querier {
             return Ok(None);
         }
         // The walk has the budget meanwhile. So contacts are charged behind it, and it may report no more than are left now.
-        let budget = self.memory.budget;
+        let budget = self.memory.budget.clone();
         let mut contacts = 0;
         let mut count = |contact, pair| {
             if contacts == budget.left() {

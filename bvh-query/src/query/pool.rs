@@ -12,15 +12,18 @@ use crate::query::querier::Querier;
 use std::fmt;
 #[cfg(feature = "parallel")]
 use std::ops::Range;
+use std::sync::atomic::AtomicBool;
 #[cfg(feature = "parallel")]
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Queriers that keep their memory from call to call, and how they are made.
 pub(crate) struct Pool {
     pub(crate) backend: Backend,
     /// The budget of each query.
     pub(crate) budget: u64,
+    /// Stops each query when it is set.
+    pub(crate) stop: Option<Arc<AtomicBool>>,
     /// In boxes, because a querier takes some KiB, which would be copied whenever it is lent.
     idle: Mutex<Vec<Box<Querier>>>,
 }
@@ -28,7 +31,7 @@ pub(crate) struct Pool {
 impl Clone for Pool {
     /// Copies the settings; queriers are made when they are needed.
     fn clone(&self) -> Self {
-        Self { budget: self.budget, ..Self::new(self.backend) }
+        Self { budget: self.budget, stop: self.stop.clone(), ..Self::new(self.backend) }
     }
 }
 
@@ -40,7 +43,7 @@ impl fmt::Debug for Pool {
 
 impl Pool {
     pub(crate) fn new(backend: Backend) -> Self {
-        Self { backend, budget: u64::MAX, idle: Mutex::default() }
+        Self { backend, budget: u64::MAX, stop: None, idle: Mutex::default() }
     }
 
     /// Adopts settings, and keeps its queriers if they are of the same backend.
@@ -49,6 +52,7 @@ impl Pool {
             *self = source.clone();
         }
         self.budget = source.budget;
+        self.stop.clone_from(&source.stop);
     }
 
     /// Lends a querier.
@@ -56,6 +60,7 @@ impl Pool {
         let idle = lock(&self.idle).pop();
         let mut querier = idle.unwrap_or_else(|| Box::new(Querier::with_backend(self.backend)));
         querier.set_budget(self.budget);
+        querier.set_stop(self.stop.clone());
         let result = ask(&mut querier);
         lock(&self.idle).push(querier);
         result

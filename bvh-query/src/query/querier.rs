@@ -12,6 +12,8 @@ use crate::query::probe::placed::IntoObject;
 use crate::query::stats::QueryStats;
 use crate::traverse::budget::Budget;
 use crate::traverse::walk_memory::WalkMemory;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Asks questions about two meshes.
 ///
@@ -120,7 +122,35 @@ impl Querier {
     /// meshes, to some 10^6, for all contacts of a deep overlap. The lists of duplicates and of the topology are not
     /// charged: a query checks each in one pass when it first needs it.
     pub fn set_budget(&mut self, visits: u64) {
-        self.budget = Budget::new(visits);
+        self.budget = Budget::new(visits).stopped_by(self.budget.stop().cloned());
+    }
+
+    /// Stops each query from now on when another thread, a timer or a signal handler sets the flag. The query then ends
+    /// with [`QueryError::Stopped`], and so does each later one until the flag is cleared. `None` removes the flag.
+    ///
+    /// A query reads the flag before its first visit and after each 256 visits ([`Querier::set_budget`]), so it ends within
+    /// a millisecond or so. What is not charged to a budget is not stopped either: the first check of a list of duplicates or of the
+    /// topology, and the boxes that a [`Bvh`](crate::Bvh) makes for its rays. A flag that is not set affects no answer.
+    ///
+    /// ```
+    /// use bvh_query::{Bvh, Pose, Querier, QueryError};
+    /// use std::sync::{Arc, atomic::{AtomicBool, Ordering}};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+    /// # let mesh = Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &bvh_bake::Options::default())?.0)?;
+    /// let (mut querier, stop) = (Querier::new()?, Arc::new(AtomicBool::new(false)));
+    /// querier.set_stop(Some(stop.clone()));
+    /// assert!(querier.collide(&mesh, &mesh, &Pose::IDENTITY)?);
+    ///
+    /// stop.store(true, Ordering::Relaxed); // on any thread
+    /// assert_eq!(querier.collide(&mesh, &mesh, &Pose::IDENTITY), Err(QueryError::Stopped));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+        self.budget = std::mem::take(&mut self.budget).stopped_by(stop);
     }
 
     /// Lets each query from now on make the visits that are left of a budget.
@@ -162,6 +192,6 @@ impl Querier {
     pub(crate) fn start(&mut self) {
         self.stats = QueryStats::default();
         self.questions += 1;
-        self.memory.budget = self.budget;
+        self.memory.budget.clone_from(&self.budget);
     }
 }

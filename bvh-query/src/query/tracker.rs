@@ -301,7 +301,7 @@ impl Tracker {
         }
         let room = beyond + LOOK_AHEAD_MOTIONS * moved;
         let mut search = PairSearch::new(DistanceOptions::default(), room);
-        let budget = querier.memory.budget;
+        let budget = querier.memory.budget.clone();
         querier.memory.budget.allow_as_much_again();
         let found = querier.search(a, b, pose, &mut search);
         querier.memory.budget = budget.after(querier.memory.budget.made());

@@ -39,6 +39,7 @@ use crate::query::stats::QueryStats;
 use contents::{Contents, check_world};
 use instance::Instance;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use trackers::Trackers;
 use workers::Workers;
 
@@ -250,6 +251,13 @@ impl Scene {
     /// pair the error names, and t threads may make t times as many visits before they stop.
     pub fn set_budget(&mut self, visits: u64) {
         self.workers.pool.budget = visits;
+    }
+
+    /// Stops each question when the flag is set, as [`Querier::set_stop`](crate::Querier::set_stop) does. The error is
+    /// [`SceneError::Pair`] or [`SceneError::Instance`] with [`QueryError::Stopped`](crate::QueryError::Stopped), or
+    /// [`SceneError::Query`] with it in the broad phase. Copies of the scene share the flag.
+    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+        self.workers.pool.stop = stop;
     }
 
     /// Adds an instance. It is in all groups, and no other instance is allowed to touch it.

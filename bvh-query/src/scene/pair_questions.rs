@@ -365,7 +365,7 @@ impl Scene {
 
     /// Asks near pairs until one is at most `d` apart. Where one is, an error about another does not matter.
     fn any_of(&mut self, near_pairs: &[NearPair], d: f64) -> Result<bool, SceneError> {
-        // By a pair that is, or because no visits are left.
+        // By a pair that is, or because no visits are left or the question is stopped.
         let is_decided = AtomicBool::new(false);
         self.remember(near_pairs);
         let answers = self.each(near_pairs, |querier, pair| {
@@ -373,7 +373,7 @@ impl Scene {
                 return Ok(None);
             }
             let answer = pair.within(querier, d);
-            if matches!(answer, Ok(true) | Err(QueryError::Budget { .. })) {
+            if matches!(answer, Ok(true) | Err(QueryError::Budget { .. } | QueryError::Stopped)) {
                 is_decided.store(true, Ordering::Relaxed);
             }
             Ok((answer != Ok(false)).then_some((pair.ids, answer)))

@@ -69,7 +69,9 @@ impl Workers {
 
     /// Returns what is left of the budget of the question.
     pub(super) fn rest(&self) -> Budget {
-        Budget::new(self.pool.budget).rest(self.left.load(Ordering::Relaxed))
+        Budget::new(self.pool.budget)
+            .stopped_by(self.pool.stop.clone())
+            .rest(self.left.load(Ordering::Relaxed))
     }
 
     /// Charges visits to the question.

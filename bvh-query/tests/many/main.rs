@@ -12,4 +12,5 @@ mod memory;
 mod motion;
 #[cfg(feature = "parallel")]
 mod scene;
+mod stop;
 mod tracker;

@@ -230,8 +230,8 @@ impl Querier {
             return Ok(clash(ClashClass::Intersecting, self.common_contact(a, b, pose)?));
         }
         let search = PenetrationOptions::new().relative_gap(options.relative_gap);
-        let visits = self.memory.budget;
-        self.memory.budget = visits.rest(visits.left().min(options.visits));
+        let visits = self.memory.budget.clone();
+        self.memory.budget = visits.clone().rest(visits.left().min(options.visits));
         let depth = self.depth_of_overlap(a, b, pose, &search);
         let made = self.memory.budget.made();
         self.memory.budget = visits;

@@ -97,9 +97,12 @@ impl Querier {
             if face.distance > 0.0 && options.is_enough(lower - bent, upper + bent) {
                 break;
             }
-            if self.memory.budget.visit().is_err() {
-                is_spent = true;
-                break;
+            match self.memory.budget.visit() {
+                Err(QueryError::Budget { .. }) => {
+                    is_spent = true;
+                    break;
+                }
+                visited => visited?,
             }
             if height - face.distance <= face.error || !polytope.grow(corner) {
                 break;

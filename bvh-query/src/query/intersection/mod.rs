@@ -203,7 +203,7 @@ impl Querier {
         each_pair(a, b, pose, |placed| {
             self.memory.budget.visit()?;
             // The walk has the budget meanwhile: it may report no more than is left now.
-            let budget = self.memory.budget;
+            let budget = self.memory.budget.clone();
             let before = pairs.len() as u64;
             let (object_a, object_b) = placed.numbers;
             let objects = [object_a - a.first() as u32, object_b - b.first() as u32];

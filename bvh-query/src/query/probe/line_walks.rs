@@ -62,6 +62,8 @@ impl Querier {
         if !self.memory.budget.is_unlimited() {
             return Err(self.memory.budget.error());
         }
+        // Lines along boxes make no visits.
+        self.memory.budget.go_on()?;
         for index in 0..placed.shape.objects().len() {
             self.ask_lines_of_object(placed, index, &mut questions.iter_mut())?;
         }

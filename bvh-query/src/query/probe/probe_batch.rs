@@ -16,6 +16,8 @@ use crate::query::probe::segment::{MeetsSegment, check_margin};
 use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
 use std::convert::Infallible;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Probes in a run of one thread.
 const PROBES_PER_RUN: usize = 256;
@@ -56,6 +58,12 @@ impl<'a> ProbeBatch<'a> {
     /// Bounds the work per probe, as [`Querier::set_budget`] does.
     pub fn set_budget(&mut self, visits: u64) {
         self.pool.budget = visits;
+    }
+
+    /// Stops each question when the flag is set, as [`Querier::set_stop`] does. The question then ends with
+    /// [`QueryError::Stopped`], and has no answer for any probe.
+    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+        self.pool.stop = stop;
     }
 
     /// Answers [`Querier::closest_point`] for each point.
