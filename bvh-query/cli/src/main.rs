@@ -13,6 +13,8 @@ mod check;
 mod clash;
 mod console;
 mod dump;
+#[cfg(test)]
+mod generated;
 mod motion;
 mod open_edges;
 mod options;
