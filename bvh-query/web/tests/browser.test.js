@@ -9,6 +9,7 @@ import { chromium } from "playwright-core";
 import { cases } from "./cases.js";
 import { read, serve } from "./files.js";
 import { writers } from "./formats.js";
+import { remoteCases } from "./remote.js";
 
 const server = await serve();
 const browser = await chromium.launch({
@@ -30,7 +31,7 @@ async function open(address) {
     return { page, errors };
 }
 
-for (const name of Object.keys(cases)) {
+for (const name of Object.keys({ ...cases, ...remoteCases })) {
     test(`page: ${name}`, async () => {
         const { page, errors } = await open("/bvh-query/web/tests/blank.html");
         const said = await page.evaluate(async (name) => (await import("./run.js")).run(name), name);
@@ -38,6 +39,9 @@ for (const name of Object.keys(cases)) {
         assert.deepEqual(errors, []);
         await page.close();
     });
+    if (name in remoteCases) {
+        continue;
+    }
     test(`worker: ${name}`, async () => {
         const { page, errors } = await open("/bvh-query/web/tests/blank.html");
         const said = await page.evaluate((name) => {
@@ -58,6 +62,16 @@ test("a module that is not there is an error that names it", async () => {
     const message = await page.evaluate(async () => {
         const { init } = await import("../dist/index.js");
         return init("/nowhere.wasm").catch((error) => error.message);
+    });
+    assert.equal(message, `cbvh: expected the module at ${server.address}/nowhere.wasm, found status 404`);
+    await page.close();
+});
+
+test("a worker without a module is an error", async () => {
+    const { page } = await open("/bvh-query/web/tests/blank.html");
+    const message = await page.evaluate(async () => {
+        const { CbvhWorker } = await import("../dist/index.js");
+        return CbvhWorker.start("/nowhere.wasm").catch((error) => error.message);
     });
     assert.equal(message, `cbvh: expected the module at ${server.address}/nowhere.wasm, found status 404`);
     await page.close();
@@ -91,7 +105,10 @@ test("the example moves B, and takes dropped files of all formats", async () => 
         const { cubeTriangles } = await import("./main.js");
         return [...cubeTriangles];
     });
-    const files = Object.entries(writers).map(([ending, write]) => [`cube.${ending}`, [...write(Float64Array.from(cube))]]);
+    const files = Object.entries(writers).map(([ending, write]) => [
+        `cube.${ending}`,
+        [...write(Float64Array.from(cube))],
+    ]);
     files.push(["baked.cbvh", [...(await read("testdata/ok-everything.cbvh"))]]);
     for (const [name, bytes] of files) {
         await page.evaluate(
@@ -109,7 +126,9 @@ test("the example moves B, and takes dropped files of all formats", async () => 
     await page.evaluate(() => {
         const dropped = new DataTransfer();
         dropped.items.add(new File(["no mesh"], "notes.txt"));
-        document.querySelector("#drop-a").dispatchEvent(new DragEvent("drop", { dataTransfer: dropped, bubbles: true }));
+        document
+            .querySelector("#drop-a")
+            .dispatchEvent(new DragEvent("drop", { dataTransfer: dropped, bubbles: true }));
     });
     await page.waitForFunction(() => document.querySelector("#message").textContent.startsWith("notes.txt: expected"));
     assert.deepEqual(errors, []);

@@ -3,10 +3,11 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import test from "node:test";
-import { Worker } from "node:worker_threads";
+import { MessageChannel, Worker } from "node:worker_threads";
 import * as cbvh from "cbvh";
 import { cases } from "./cases.js";
 import { list, read } from "./files.js";
+import { remoteCases } from "./remote.js";
 
 await cbvh.init();
 for (const [name, work] of Object.entries(cases)) {
@@ -83,4 +84,24 @@ test("a worker gets the compiled module", async () => {
     const bytes = await new Promise((resolve, reject) => worker.once("message", resolve).once("error", reject));
     await worker.terminate();
     assert.equal(cbvh.Mesh.open(bytes).triangleCount, 1);
+});
+
+/** Starts a worker of Node, which serves a port. */
+function start() {
+    const { port1, port2 } = new MessageChannel();
+    const program = `
+        import { workerData } from "node:worker_threads";
+        import { serve } from ${JSON.stringify(import.meta.resolve("cbvh"))};
+        serve(workerData);`;
+    const url = new URL(`data:text/javascript,${encodeURIComponent(program)}`);
+    new Worker(url, { workerData: port2, transferList: [port2] });
+    return cbvh.CbvhWorker.start(undefined, port1);
+}
+
+for (const [name, work] of Object.entries(remoteCases)) {
+    test(`served by a worker: ${name}`, () => work(cbvh, start));
+}
+
+test("without a class Worker, a port is asked for", async () => {
+    await assert.rejects(() => cbvh.CbvhWorker.start(), /^Error: port: expected a port to a worker that calls `serve`/);
 });

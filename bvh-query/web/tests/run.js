@@ -2,6 +2,7 @@
 
 import * as cbvh from "../dist/index.js";
 import { cases } from "./cases.js";
+import { remoteCases } from "./remote.js";
 
 async function get(address) {
     const response = await fetch(new URL(`../../../${address}`, import.meta.url));
@@ -18,7 +19,11 @@ const list = async (folder, prefix) => (await get(`list/${folder}/${prefix}`)).j
 export async function run(name) {
     try {
         await cbvh.init();
-        await cases[name](cbvh, read, list);
+        if (name in cases) {
+            await cases[name](cbvh, read, list);
+        } else {
+            await remoteCases[name](cbvh, () => cbvh.CbvhWorker.start());
+        }
         return "passed";
     } catch (error) {
         return error.stack;

@@ -1,6 +1,7 @@
 /** A program in TypeScript that uses the package: it is only checked. */
 
 import {
+    CbvhWorker,
     IDENTITY,
     init,
     Mesh,
@@ -14,6 +15,7 @@ import {
     Side,
     type BakeOptions,
     type Distance,
+    type RemoteMesh,
     type SceneDistance,
 } from "cbvh";
 
@@ -53,4 +55,26 @@ export async function ask(file: File): Promise<number> {
     const wrong: boolean = a.collideEach(b, at);
 
     return [touching, flags[0], nearest.pointA[0], name, end, inside, pair?.a, free, wrong].length;
+}
+
+export async function askLater(bytes: Uint8Array): Promise<number> {
+    const worker = await CbvhWorker.start(new URL("cbvh_bg.wasm", "https://example.org"));
+    const mesh: RemoteMesh = await worker.Mesh.bake(new Float32Array(9), null, { onStage: (stage) => console.log(stage.length) });
+    const ball: RemoteMesh = await worker.sphere(1);
+    const flags: Uint8Array = await mesh.collideEach(ball, IDENTITY);
+    const nearest: Distance = await mesh.distance(await worker.Mesh.open(bytes), IDENTITY, { relErr: 0.1 });
+    const triangles: number = await mesh.triangleCount;
+    const scene = await worker.Scene.make();
+    const id: number = await scene.add(mesh, null, { name: "a" });
+    const motion = await worker.Motion.between(IDENTITY, pose([1, 0, 0], [0, 0, 0, 1]));
+    const free: boolean = await scene.isFree(new Map([["a", motion]]));
+    await mesh.free();
+
+    // @ts-expect-error A mesh of the page is not one of the worker.
+    mesh.collide(Mesh.open(bytes), IDENTITY);
+    // @ts-expect-error Answers come later.
+    const wrong: boolean = mesh.collide(ball, IDENTITY);
+
+    worker.terminate();
+    return [flags[0], nearest.distance, triangles, id, free, wrong].length;
 }
