@@ -53,7 +53,16 @@ export type { ModuleSource } from "./module.js";
 export { init, initSync, memoryBytes } from "./module.js";
 export { Motion } from "./motion.js";
 export { IDENTITY, nearestPose, pose, relative } from "./poses.js";
-export type { AllLater, Later, Port, Remote, RemoteFunctions, RemoteMesh, RemoteMotion, RemoteScene } from "./remote.js";
+export type {
+    AllLater,
+    Later,
+    Port,
+    Remote,
+    RemoteFunctions,
+    RemoteMesh,
+    RemoteMotion,
+    RemoteScene,
+} from "./remote.js";
 export { CbvhWorker } from "./remote.js";
 export type { Instance, InstanceOptions } from "./scene.js";
 export { Scene } from "./scene.js";
