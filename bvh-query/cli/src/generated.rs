@@ -14,7 +14,7 @@ use clap_complete::{Generator, Shell, generate};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::{env, fs, str};
+use std::{env, fs};
 
 /// A file of the repository, and what it is to contain.
 type Files = BTreeMap<PathBuf, String>;
