@@ -37,4 +37,6 @@ struct Readme;
 #[doc = include_str!("../../../spec/book/src/guide/baking.md")]
 #[doc = include_str!("../../../spec/book/src/guide/points-and-rays.md")]
 #[doc = include_str!("../../../spec/book/src/guide/shapes.md")]
+#[doc = include_str!("../../../spec/book/src/guide/motions.md")]
+#[doc = include_str!("../../../spec/book/src/guide/scenes.md")]
 struct Book;

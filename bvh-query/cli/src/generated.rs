@@ -77,7 +77,7 @@ fn completions() -> Files {
 fn reference() -> String {
     let mut page = String::from(
         "# Commands and options\n\nThis page is generated from the help of the command: `cbvh help COMMAND` prints the same. \
-         [The README of the command](../../../../bvh-query/cli/README.md) explains files, output and exit codes.\n",
+         [The command in detail](command.md) explains files, output and exit codes.\n",
     );
     walk(&built(), &mut |command| section(&mut page, command));
     page
@@ -149,7 +149,7 @@ fn files() -> Files {
         .flatten()
         .map(|(path, text)| (Path::new("bvh-query/cli/generated").join(path), text))
         .collect();
-    all.insert("spec/book/src/reference/command.md".into(), reference());
+    all.insert("spec/book/src/reference/options.md".into(), reference());
     all
 }
 

@@ -1,4 +1,4 @@
-//! Compares the table of the README, which says what is read, left out and refused, with what readers do.
+//! Compares the table of the book, which says what is read, left out and refused, with what readers do.
 
 use super::collada::{HERE, faces, square};
 use super::gltf_model::{Model, PRIMITIVE};
@@ -9,8 +9,8 @@ use std::path::Path;
 
 /// Returns the cells of a format's row: its name, what is read, what is left out with a warning, and what is refused.
 fn row(format: &str) -> [String; 4] {
-    let readme = include_str!("../../../README.md");
-    let row = readme.lines().find(|line| line.starts_with(&format!("| {format} |"))).unwrap();
+    let page = include_str!("../../../../spec/book/src/reference/mesh-files.md");
+    let row = page.lines().find(|line| line.starts_with(&format!("| {format} |"))).unwrap();
     let cells: Vec<_> = row.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
     cells.try_into().unwrap()
 }
