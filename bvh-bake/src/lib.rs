@@ -44,8 +44,9 @@
 //! # Guarantees
 //!
 //! No input makes a bake panic: every error names the file, the place, what was expected and what was found. Equal
-//! meshes and options give equal bytes. A vertex that an `f32` relative to the origin cannot represent is moved, and
-//! the file states the largest such move.
+//! meshes and options give equal bytes. A vertex of the file is the `f64` number that was given. It moves only if an option
+//! says so ([`Options::weld`], [`Options::round`], quantised triangles), or to the nearest multiple of 2^-180 if a coordinate is
+//! below 2^-128 in magnitude. The file states by how far.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 

@@ -1,9 +1,9 @@
 //! Exact collision and distance queries between `.cbvh` meshes.
 //!
 //! [`Bvh`] opens a file (mapped, read, in memory, or embedded with [`include_cbvh!`]), [`Pose`] places one mesh in the
-//! frame of another, and a [`Querier`] answers:
+//! frame of another, and a [`Querier`] computes:
 //!
-//! | question | method | answer |
+//! | task | method | result |
 //! |---|---|---|
 //! | do they touch? | [`Querier::collide`] | `bool`, exact |
 //! | which triangles touch? | [`Querier::contacts`], [`Querier::visit_contacts`] | pairs of triangle ids, exact |
@@ -24,8 +24,8 @@
 //! | do they touch, or is one inside the other? | [`Querier::relation`] | touching, apart, inside, mixed; exact |
 //! | is a motion free, and where does it end? | [`Querier::motion`], [`Querier::is_free`] | free, hit or near, certain at every moment |
 //!
-//! [`Scene`] answers these questions about many placed shapes, over all pairs that matter, except for contact regions,
-//! patches, self contacts, penetrations and separations, which a [`Querier`] answers pair by pair. [`Tracker`] answers
+//! [`Scene`] runs these queries on many placed shapes, over all pairs that matter, except for contact regions,
+//! patches, self contacts, penetrations and separations, which a [`Querier`] computes pair by pair. [`Tracker`] computes
 //! whether two meshes touch, how far apart they are and whether they are within a distance in less time, for poses that
 //! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
 //! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
@@ -156,7 +156,7 @@ macro_rules! include_cbvh {
 #[derive(Debug)]
 pub struct Embedded<B: ?Sized>(pub B);
 
-/// What a question visits, for the page of `cbvh view` alone.
+/// The nodes and packets that a query visits, for the page of `cbvh view` alone.
 #[doc(hidden)]
 #[cfg(feature = "__trace")]
 pub mod trace {
@@ -192,9 +192,9 @@ pub enum Error {
     Backend(#[from] BackendError),
     /// Numbers make no pose, or poses or numbers make no path.
     Pose(#[from] PoseError),
-    /// A question about meshes has no answer.
+    /// A query about meshes has no result.
     Query(#[from] QueryError),
-    /// A file makes no scene, a scene refuses an instance or does not have it, or a question about it has no answer.
+    /// A file makes no scene, a scene refuses an instance or does not have it, or a query about it has no result.
     Scene(#[from] SceneError),
 }
 

@@ -1,4 +1,4 @@
-"""A Coal user's code beside its port to cbvh: the same questions about the same poses, with the same answers.
+"""A Coal user's code beside its port to cbvh: the same queries of the same poses, with the same results.
 
     pip install coal
     python examples/from_coal.py
@@ -25,11 +25,11 @@ TESTDATA = pathlib.Path(__file__).resolve().parents[3] / "testdata"
 
 
 def read_obj(path):
-    """Vertices, rounded to float32 as cbvh stores them, so that both hold the same mesh, and faces."""
+    """Vertices and faces. Both libraries hold these numbers as they are."""
     lines = [line.split() for line in path.read_text().splitlines()]
     vertices = [[float(field) for field in line[1:4]] for line in lines if line[:1] == ["v"]]
     faces = [[int(field.split("/")[0]) - 1 for field in line[1:4]] for line in lines if line[:1] == ["f"]]
-    return np.array(vertices, np.float32).astype(float), np.array(faces)
+    return np.array(vertices), np.array(faces)
 
 
 def random_poses(count):

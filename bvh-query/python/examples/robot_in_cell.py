@@ -24,7 +24,7 @@ URDF = HERE.parents[2] / "testdata" / "robot" / "robot.urdf"
 PICTURE = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "robot_in_cell.png"
 
 # %%
-# The robot, and what stands around it. The meshes of neighbours meet at their joints, and are not asked about.
+# The robot, and what stands around it. The meshes of neighbours meet at their joints, and are not checked.
 robot = cbvh.Robot.from_urdf(URDF)
 for pair in zip(robot.links, robot.links[1:]):
     robot.allow(*pair)

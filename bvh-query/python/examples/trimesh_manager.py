@@ -19,10 +19,8 @@ TESTDATA = pathlib.Path(__file__).resolve().parents[3] / "testdata"
 
 
 def load(name):
-    """A mesh of testdata, rounded to float32 as cbvh stores it, so that both managers hold the same mesh."""
-    mesh = trimesh.load_mesh(TESTDATA / name, process=False)
-    mesh.vertices = mesh.vertices.astype(np.float32)
-    return mesh
+    """A mesh of testdata. Both managers hold its vertices as they are."""
+    return trimesh.load_mesh(TESTDATA / name, process=False)
 
 
 def places(seed, count):

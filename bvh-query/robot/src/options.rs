@@ -3,13 +3,13 @@
 use bvh_bake::input::UpAxis;
 use std::path::PathBuf;
 
-/// Which shapes of links are asked about.
+/// Which geometry of links to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Geometry {
-    /// Those that the URDF names for collisions.
+    /// The `<collision>` geometry.
     #[default]
     Collision,
-    /// Those that it names for pictures.
+    /// The `<visual>` geometry.
     Visual,
 }
 
@@ -30,9 +30,9 @@ pub enum Base {
 pub struct RobotOptions {
     /// Folders in which packages are looked for, before those of `ROS_PACKAGE_PATH` and those above the URDF file.
     pub packages: Vec<PathBuf>,
-    /// An SRDF file, whose disabled pairs are not asked about.
+    /// An SRDF file, whose disabled pairs are not checked.
     pub srdf: Option<PathBuf>,
-    /// Which shapes of links are asked about.
+    /// Which geometry of links to use.
     pub geometry: Geometry,
     /// How the root is connected with the world.
     pub base: Base,

@@ -15,7 +15,7 @@ pub struct RobotParts {
     pub urdf: (PathBuf, String),
     /// The SRDF file, for messages, and its text.
     pub srdf: Option<(PathBuf, String)>,
-    /// Which shapes of links are asked about.
+    /// Which geometry of links to use.
     pub geometry: Geometry,
     /// How the root is connected with the world.
     pub base: Base,

@@ -191,7 +191,7 @@ impl Robot {
         answers.into_iter().flatten().enumerate().map(named).collect()
     }
 
-    /// Lets pairs touch that nearly always do: those that are in contact in at least this share of some random configurations
+    /// Allows contact between pairs that collide in nearly every configuration: in at least this share of some random configurations
     /// within the joints' limits, as MoveIt's assistant does. A joint value without limits is taken between -pi and pi. Returns the
     /// pairs, each with its share. The configurations are the same each time.
     ///

@@ -18,11 +18,11 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// A robot among obstacles, asked about with the values of its joints.
+/// A robot among obstacles. Queries take the values of its joints.
 ///
-/// A body is a link, an obstacle or an attached object. Questions are about all pairs of bodies that can move against each
+/// A body is a link, an obstacle or an attached object. Queries check all pairs of bodies that can move against each
 /// other, but for those whose contact is allowed: by [`Robot::allow`], or by the SRDF. Links that only fixed joints connect, and
-/// obstacles among themselves, are never asked about.
+/// obstacles among themselves, are never checked.
 ///
 /// All answers are certain, as those of [`Querier`](bvh_query::Querier) are, about the poses that the joint values give in `f64`.
 /// They have the same bits on all systems. Lengths are in the unit of the URDF file, metres; angles are in radians.
@@ -153,7 +153,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Returns a clone to ask questions of on another thread, which does not have to find the pairs again.
+    /// Returns a clone for use on another thread, which does not have to find the pairs again.
     pub fn snapshot(&mut self) -> Self {
         self.refresh();
         self.clone()
@@ -401,7 +401,7 @@ impl Robot {
         Ok(())
     }
 
-    /// Returns the pairs of bodies that are asked about.
+    /// Returns the pairs of bodies that are checked.
     pub fn pairs(&mut self) -> Vec<[String; 2]> {
         self.refresh();
         let setting = &self.setting;

@@ -33,9 +33,9 @@ use crate::query::placed_pair::FoundPair;
 use crate::query::querier::Querier;
 use crate::query::rounded::limit_of_cores;
 
-/// Reuses the last answers about two meshes, so that an answer about a nearby pose costs less.
+/// Reuses the last results for two meshes, so that a query of a nearby pose costs less.
 ///
-/// A tracker asks the questions of [`Querier`] and gives the same answers, bit for bit. Keep one tracker for each pair
+/// A tracker has queries of [`Querier`] and gives the same results, bit for bit. Keep one tracker for each pair
 /// of meshes that moves along a path. Meshes and poses may come in any order: a pose far from the last one costs one
 /// more test of two triangles, and other meshes make the tracker forget. A tracker holds some 300 bytes, borrows
 /// nothing, and allocates nothing that the querier would not.

@@ -1,4 +1,4 @@
-//! Self-contained HTML pages that show meshes, motions, scenes, clashes and robots, and ask cbvh about them in the browser.
+//! Self-contained HTML pages that show meshes, motions, scenes, clashes and robots, and run cbvh in the browser.
 //!
 //! A page is one file. It needs no network and no server, and opens from a disk. It holds the files that it shows, the program
 //! that draws them, and the query library itself as WebAssembly, so that what it answers is what the library answers.

@@ -158,7 +158,7 @@ class Robot:
         """Reads a URDF file and bakes the shapes of all links: OBJ, STL, PLY, glTF and COLLADA meshes, and primitives.
 
         ``package://`` paths are looked for in ``package_dirs``, in ``ROS_PACKAGE_PATH`` and in the folders above the file.
-        Pairs of links that ``srdf`` disables are not asked about. A ``base`` that moves adds joint values: ``base/x``,
+        Pairs of links that ``srdf`` disables are not checked. A ``base`` that moves adds joint values: ``base/x``,
         ``base/y`` and ``base/theta``, or ``base/x`` to ``base/z`` and a quaternion, ``base/qx`` to ``base/qw``. A cylinder is a
         prism around it, wider by at most ``cylinder_error`` of its radius. ``apply_up_axis`` turns COLLADA meshes so that the
         axis that they declare to point up becomes z; rviz, MoveIt, Gazebo and Pinocchio leave them as they are. Their unit is always
@@ -274,13 +274,14 @@ class Robot:
         return [(a, b) for a, b in self._robot.pairs()]
 
     def allow(self, a: str, b: str, allowed: bool = True) -> None:
-        """Lets two bodies touch, so that they are not asked about; or asks about them again."""
+        """Allows contact between two bodies, so that they are not checked; or checks them again."""
         self._robot.allow(a, b, bool(allowed))
 
     def allow_frequent(self, samples: int = 1000, share: float = 0.95) -> list[tuple[tuple[str, str], float]]:
-        """Lets pairs touch that nearly always do, as MoveIt's assistant does, and returns them with their shares.
+        """Allows contact between pairs that collide in nearly every configuration, and returns them with their shares.
 
-        These are the pairs that touch in at least ``share`` of some random configurations within the joints' limits. A joint
+        These are the pairs that touch in at least ``share`` of some random configurations within the joints' limits, as in MoveIt's
+        assistant. A joint
         value without limits is taken between -pi and pi. The configurations are the same each time.
         """
         found = self._robot.allow_frequent(int(samples), float(share))

@@ -26,11 +26,11 @@ const LINES_AT_ONCE: usize = 32;
 /// Lines are sorted where a file does not stay in the caches nearest to a processor.
 const MIN_SORTED_BYTES: usize = 16 << 20;
 
-/// Asks about many points, rays or segments and one mesh, on all threads of the rayon pool it is called in.
+/// Queries of many points, rays or segments and one mesh, on all threads of the rayon pool it is called in.
 ///
 /// The answers are those of [`Querier`], bit for bit and in the order of the probes. A batch needs the memory of one querier
 /// per thread, which it keeps for the next call, of the answers, and 16 bytes per probe. A batch of rays or segments takes less time
-/// per probe than single questions do, as some are asked together.
+/// per probe than single queries do, as some are run together.
 ///
 /// # Errors
 /// Each method returns the error of the first probe, in their order, that has no answer.
