@@ -62,6 +62,20 @@ class Documents(unittest.TestCase):
         self.assertGreater(len(pages.chapters()), 30)
         self.assertTrue(all(isinstance(path, pathlib.Path) and path.exists() for path in pages.chapters()))
 
+    def test_a_search_finds_the_page_of_each_term(self):
+        """The search of the book looks for words in pages, so a page has the words that people search for."""
+        lines = (pages.BOOK / "terms.txt").read_text(encoding="utf-8").splitlines()
+        terms = [line.split(" | ") for line in lines if line and not line.startswith("#")]
+        self.assertGreaterEqual(len(terms), 60)
+        texts = {}
+        for path in pages.chapters():
+            text = path.read_text(encoding="utf-8")
+            parts = [text, *((path.parent / name).read_text(encoding="utf-8") for name in pages.included(text))]
+            texts[path.relative_to(pages.SOURCES).as_posix()] = " ".join("\n".join(parts).lower().split())
+        for term, page in terms:
+            with self.subTest(term=term, page=page):
+                self.assertIn(term.lower(), texts[page])
+
 
 if __name__ == "__main__":
     unittest.main()
