@@ -53,6 +53,9 @@ pub(crate) trait LineQuestion {
     fn decide(&mut self, candidate: &Candidate<'_>) -> Result<(), QueryError>;
 }
 
+/// The numbers of a triangle's instance, its object and itself.
+pub(super) type Numbers = (u32, u32, u32);
+
 /// A triangle that a line may meet.
 pub(crate) struct Candidate<'a> {
     /// In the frame of the question.
@@ -69,7 +72,7 @@ pub(crate) struct Candidate<'a> {
 
 impl Candidate<'_> {
     /// Returns the numbers of its instance, its object and itself.
-    pub(super) fn numbers(&self) -> Result<(u32, u32, u32), QueryError> {
+    pub(super) fn numbers(&self) -> Result<Numbers, QueryError> {
         let (instance, object) = self.numbers;
         Ok((instance, object, self.bvh.triangle_id(self.stored_in, self.place())?))
     }

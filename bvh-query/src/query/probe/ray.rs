@@ -2,7 +2,7 @@
 
 use crate::error::{NumberError, QueryError};
 use crate::narrow::{self, Crossing, RoundedRay, Triangle};
-use crate::query::probe::line::{Candidate, Line, LineQuestion};
+use crate::query::probe::line::{Candidate, Line, LineQuestion, Numbers};
 use crate::query::probe::placed::PlacedShape;
 use crate::query::probe::point::check_point;
 use crate::query::probe::stays::{Rounded, ends};
@@ -204,9 +204,6 @@ impl Scaled {
         (instance, hit)
     }
 }
-
-/// The numbers of a triangle's instance, its object and itself.
-pub(super) type Numbers = (u32, u32, u32);
 
 /// A triangle that a ray meets.
 #[derive(Clone, Copy)]

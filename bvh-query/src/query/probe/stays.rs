@@ -4,7 +4,7 @@
 //! joined where they meet, or where their bounds do not prove that they are apart. What is left are the intervals of the whole shape.
 
 use crate::narrow::{Crossing, Ray, RoundedRay, Triangle, dot};
-use crate::query::probe::ray::Numbers;
+use crate::query::probe::line::Numbers;
 
 /// A triangle within whose radius a ray comes.
 pub(super) struct Rounded {
