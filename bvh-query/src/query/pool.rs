@@ -55,12 +55,19 @@ impl Pool {
         self.stop.clone_from(&source.stop);
     }
 
-    /// Lends a querier.
-    fn lend<R>(&self, ask: impl FnOnce(&mut Querier) -> R) -> R {
+    /// Takes a querier out, with the settings of the pool. Inlined, each question would have the code.
+    #[inline(never)]
+    fn take(&self) -> Box<Querier> {
         let idle = lock(&self.idle).pop();
         let mut querier = idle.unwrap_or_else(|| Box::new(Querier::with_backend(self.backend)));
         querier.set_budget(self.budget);
         querier.set_stop(self.stop.clone());
+        querier
+    }
+
+    /// Lends a querier.
+    fn lend<R>(&self, ask: impl FnOnce(&mut Querier) -> R) -> R {
+        let mut querier = self.take();
         let result = ask(&mut querier);
         lock(&self.idle).push(querier);
         result

@@ -154,6 +154,7 @@ impl Querier {
     }
 
     /// Lets each query from now on make the visits that are left of a budget.
+    #[inline(never)]
     pub(crate) fn set_rest(&mut self, rest: Budget) {
         self.budget = rest;
     }

@@ -67,7 +67,8 @@ impl Workers {
         *self.left.get_mut() = self.pool.budget;
     }
 
-    /// Returns what is left of the budget of the question.
+    /// Returns what is left of the budget of the question. Inlined, each question would have the code.
+    #[inline(never)]
     pub(super) fn rest(&self) -> Budget {
         Budget::new(self.pool.budget)
             .stopped_by(self.pool.stop.clone())

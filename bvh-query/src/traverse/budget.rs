@@ -98,7 +98,9 @@ impl Budget {
     }
 
     /// Counts some visits. If they are more than are left, none are left.
-    #[inline(always)]
+    // Pages load one copy.
+    #[cfg_attr(not(all(target_arch = "wasm32", target_os = "unknown")), inline(always))]
+    #[cfg_attr(all(target_arch = "wasm32", target_os = "unknown"), inline(never))]
     pub(crate) fn charge(&mut self, visits: u64) -> Result<(), QueryError> {
         match self.portion.checked_sub(visits) {
             Some(left) => {
