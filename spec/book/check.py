@@ -3,7 +3,9 @@
     check.py links                  every relative link leads to a file and an anchor; the book's pages are all listed, and show
                                     programs of the repository as they are
     check.py commands CBVH [PAGE]   runs the shell blocks of the book with this command, and compares their output
-    check.py programs FOLDER...     runs the example programs that pages show, from these folders, and compares their output
+    check.py programs FOLDER...     runs the example programs that pages show or that state their output, from these folders, and
+                                    compares it
+    check.py tasks                  runs the Python programs of the page of tasks with this Python, and compares the output that they state
     check.py site FOLDER            every link of the pages that mdBook wrote there leads to a file
     check.py words                  prints the number of words of each page
 
@@ -18,10 +20,13 @@ import re
 import subprocess
 import sys
 import tempfile
+import textwrap
 import urllib.parse
 
 import pages
 
+# The page of examples by task.
+TASKS = pages.SOURCES / "reference/examples.md"
 
 
 def expected(shown: str, found: str) -> bool:
@@ -141,9 +146,54 @@ def check_files() -> list[str]:
     return wrong
 
 
+def stated(text: str) -> str | None:
+    """The output that the documentation at the head of a program states, of Python behind `It prints:`, of Rust in a block of text."""
+    if found := re.match(r'"""(?:(?!""").)*?\nIt prints:\n\n(.*?)"""', text, re.S):
+        return textwrap.dedent(found[1])
+    head = re.match(r"(?://!.*\n)*", text)[0]
+    found = re.search(r"^//! It prints:\n//!\n//! ```text\n(.*?)^//! ```$", head, re.S | re.M)
+    return re.sub("^//! ?", "", found[1], flags=re.M) if found else None
+
+
+def task_programs(suffix: str) -> list[pathlib.Path]:
+    """The programs that the page of tasks links to and that state their output."""
+    text = TASKS.read_text(encoding="utf-8")
+    linked = (pathlib.Path(os.path.normpath(TASKS.parent / target)) for _, target in pages.links(text) if target.endswith(suffix))
+    return [path for path in dict.fromkeys(linked) if stated(path.read_text(encoding="utf-8")) is not None]
+
+
+def run(command: list, place: str) -> subprocess.CompletedProcess:
+    """Runs a program in a folder that has testdata as the repository has it."""
+    os.symlink(pages.ROOT / "testdata", os.path.join(place, "testdata"))
+    return subprocess.run(command, cwd=place, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+
+
+def check_tasks() -> list[str]:
+    wrong, programs = [], task_programs(".py")
+    for path in programs:
+        with tempfile.TemporaryDirectory() as place:
+            ended = run([sys.executable, path], place)
+        if ended.returncode != 0 or ended.stdout != stated(path.read_text(encoding="utf-8")):
+            wrong.append(f"{name(path)}: expected the output that it states, found\n{ended.stdout}{ended.stderr}")
+    if len(programs) < 20:
+        wrong.append(f"expected more programs of tasks, found {len(programs)}")
+    print(f"{len(programs)} tasks")
+    return wrong
+
+
 def check_programs(folders: list[str]) -> list[str]:
     """Of all programs that pages show, those that are in these folders: programs of each language are built apart."""
     wrong, count = [], 0
+    for path in task_programs(".rs"):
+        for folder in folders:
+            program = pathlib.Path(folder).resolve() / path.stem
+            if program.parent.name != "examples" or not program.exists():
+                continue
+            count += 1
+            with tempfile.TemporaryDirectory() as place:
+                ended = run([program], place)
+            if ended.returncode != 0 or ended.stdout != stated(path.read_text(encoding="utf-8")):
+                wrong.append(f"{name(path)}: expected the output that it states, found\n{ended.stdout}{ended.stderr}")
     for path in pages.chapters():
         for block, shown in pairs(path):
             file = shown_file(block)
@@ -156,10 +206,7 @@ def check_programs(folders: list[str]) -> list[str]:
                 command = ["node", program] if file.suffix == ".mjs" else [program]
                 count += 1
                 with tempfile.TemporaryDirectory() as place:
-                    os.symlink(pages.ROOT / "testdata", os.path.join(place, "testdata"))
-                    ended = subprocess.run(
-                        command, cwd=place, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300
-                    )
+                    ended = run(command, place)
                 if ended.returncode != 0 or shown is None or not expected(shown, ended.stdout):
                     wrong.append(f"{name(path)}:{block.line}: expected\n{shown}found\n{ended.stdout}{ended.stderr}")
     if count == 0:
@@ -200,6 +247,8 @@ def main() -> int:
             wrong = check_commands(command, *page)
         case ["programs", *folders] if folders:
             wrong = check_programs(folders)
+        case ["tasks"]:
+            wrong = check_tasks()
         case ["site", folder]:
             wrong = check_site(folder)
         case ["words"]:

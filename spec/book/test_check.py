@@ -1,6 +1,7 @@
 """Tests how documents are read, and that the checks find what they are for."""
 
 import pathlib
+import re
 import unittest
 
 import check
@@ -57,6 +58,22 @@ class Documents(unittest.TestCase):
         self.assertEqual(led("[c](reader/check.py)"), "[c](../../../spec/reader/check.py)")
         self.assertEqual(led("[s](suite/README.md)", "https://x.example/tree"), "[s](https://x.example/tree/spec/suite/README%2Emd)")
         self.assertEqual(led("`[a](b.md)` [w](https://x.example) [h](#part)"), "`[a](b.md)` [w](https://x.example) [h](#part)")
+
+    def test_programs_state_their_output(self):
+        self.assertEqual(check.stated('"""Task.\n\nIt prints:\n\n    a\n      b\n"""\nprint()\n'), "a\n  b\n")
+        self.assertEqual(check.stated("//! Task.\n//!\n//! It prints:\n//!\n//! ```text\n//! a\n//!   b\n//! ```\n#![allow()]\n"), "a\n  b\n")
+        self.assertIsNone(check.stated('"""Task."""\n"""It prints:\n\n    a\n"""\n'))
+        self.assertIsNone(check.stated("//! Task.\nfn main() {}\n"))
+
+    def test_programs_of_tasks_are_short_and_listed(self):
+        listed = {suffix: check.task_programs(suffix) for suffix in (".py", ".rs")}
+        self.assertEqual(set(listed[".py"]), set((pages.ROOT / "bvh-query/python/examples/tasks").glob("*.py")))
+        self.assertLessEqual(set((pages.ROOT / "bvh-query/cbvh/examples").glob("*.rs")), {*listed[".rs"], pages.ROOT / "bvh-query/cbvh/examples/start.rs"})
+        for path in [*listed[".py"], *listed[".rs"]]:
+            with self.subTest(path=path.name):
+                _, program = re.split(r'\n"""\n|^#!\[allow.*\n', path.read_text(encoding="utf-8"), maxsplit=1, flags=re.M)
+                self.assertIn(sum(bool(line.strip()) for line in program.splitlines()), range(10, 35))
+        self.assertGreaterEqual(sum(line.startswith("| ") for line in check.TASKS.read_text(encoding="utf-8").splitlines()), 20)
 
     def test_all_chapters_are_there(self):
         self.assertGreater(len(pages.chapters()), 30)
