@@ -18,7 +18,7 @@ import cbvh
 HERE = pathlib.Path(__file__).resolve().parent
 TESTDATA = HERE.parents[2] / "testdata"
 PICTURE = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "ambient_occlusion.png"
-WIDTH, HEIGHT = 720, 480
+WIDTH, HEIGHT = 660, 440
 # Rays per pixel, directions per ray, and how far away what hides the sky may be, in mesh units: most of the height of the room.
 SAMPLES, DIRECTIONS, REACH = 4, 16, 2500.0
 
