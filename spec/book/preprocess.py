@@ -1,8 +1,9 @@
 """Prepares the chapters for mdBook: includes documents of the repository as a whole, and leads their links to where they are in the book.
 
 A link to a document that a chapter includes becomes a link to that chapter. A link to another file of the repository begins with the
-address of the repository, if book.toml states one (`[preprocessor.repository] address`); otherwise it leads to the file in the checkout
-in which the book was built.
+address of the repository, if book.toml states one (`[preprocessor.repository] address`). If a folder of the book is stated (`files`, as
+`.ci/site` does), pictures and, without an address, all links lead to copies there, which site_files.py makes. Otherwise links lead to the
+file in the checkout in which the book was built.
 """
 
 import json
@@ -12,9 +13,18 @@ import re
 import sys
 
 import pages
+import site_files
 
 
-def led(text: str, folder: pathlib.Path, chapter: pathlib.Path, places: dict, address: str | None, output: pathlib.Path) -> str:
+def led(
+    text: str,
+    folder: pathlib.Path,
+    chapter: pathlib.Path,
+    places: dict,
+    address: str | None,
+    output: pathlib.Path,
+    files: str | None = None,
+) -> str:
     """A text from a document in `folder` with links as they are in a chapter."""
 
     def replaced(found: re.Match) -> str:
@@ -26,8 +36,11 @@ def led(text: str, folder: pathlib.Path, chapter: pathlib.Path, places: dict, ad
         there = places.get(there, there)
         if there.is_relative_to(pages.SOURCES):
             new = os.path.relpath(there, chapter.parent)
-        elif address:
+        elif address and not (files and there.suffix in site_files.PICTURES):
             new = f"{address}/{there.relative_to(pages.ROOT).as_posix()}"
+        elif files:
+            copy = pathlib.PurePosixPath(files, site_files.copy_of(there.relative_to(pages.ROOT)))
+            new = os.path.relpath(copy, chapter.parent.relative_to(pages.SOURCES))
         else:
             new = os.path.relpath(there, output / chapter.parent.relative_to(pages.SOURCES))
         if not there.is_relative_to(pages.SOURCES) and new.endswith(".md"):
@@ -44,7 +57,8 @@ def main() -> None:
     if sys.argv[1:2] == ["supports"]:
         return
     context, book = json.load(sys.stdin)
-    address = context["config"].get("preprocessor", {}).get("repository", {}).get("address")
+    own = context["config"].get("preprocessor", {}).get("repository", {})
+    address, files = own.get("address"), own.get("files")
     output = (pages.BOOK / context["config"]["build"]["build-dir"]).resolve()
     places = {}
     for chapter in pages.chapters():
@@ -60,10 +74,10 @@ def main() -> None:
             def whole(found: re.Match) -> str:
                 document = (chapter.parent / found[1]).resolve()
                 text = document.read_text(encoding="utf-8")
-                return led(text, document.parent, chapter, places, address, output)
+                return led(text, document.parent, chapter, places, address, output, files)
 
-            own = led(item["Chapter"]["content"], chapter.parent, chapter, places, address, output)
-            item["Chapter"]["content"] = pages.INCLUDE.sub(whole, own)
+            text = led(item["Chapter"]["content"], chapter.parent, chapter, places, address, output, files)
+            item["Chapter"]["content"] = pages.INCLUDE.sub(whole, text)
             prepare(item["Chapter"]["sub_items"])
 
     prepare(book["items"] if "items" in book else book["sections"])

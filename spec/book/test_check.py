@@ -57,6 +57,15 @@ class Documents(unittest.TestCase):
         self.assertEqual(led("[terms](glossary.md#slab)"), "[terms](../reference/glossary.md#slab)")
         self.assertEqual(led("[c](reader/check.py)"), "[c](../../../spec/reader/check.py)")
         self.assertEqual(led("[s](suite/README.md)", "https://x.example/tree"), "[s](https://x.example/tree/spec/suite/README%2Emd)")
+
+        def copied(text, address=None):
+            return preprocess.led(text, pages.ROOT / "spec", here, {glossary: chapter}, address, output, "files")
+
+        self.assertEqual(copied("[terms](glossary.md#slab)"), "[terms](../reference/glossary.md#slab)")
+        self.assertEqual(copied("[c](reader/check.py)"), "[c](../files/spec/reader/check.py.html)")
+        self.assertEqual(copied("[s](suite/README.md) [r](reader)"), "[s](../files/spec/suite/README.html) [r](../files/spec/reader/index.html)")
+        self.assertEqual(copied("![p](../bvh-query/view/view.png)", "https://x.example/tree"), "![p](../files/bvh-query/view/view.png)")
+        self.assertEqual(copied("[c](reader/check.py)", "https://x.example/tree"), "[c](https://x.example/tree/spec/reader/check.py)")
         self.assertEqual(led("`[a](b.md)` [w](https://x.example) [h](#part)"), "`[a](b.md)` [w](https://x.example) [h](#part)")
 
     def test_programs_state_their_output(self):

@@ -1,4 +1,7 @@
-/** Moves one mesh past another, and shows the answers of the library. */
+/**
+ * Moves one mesh past another, and shows the answers of the library. The address of the page may name other meshes, and the values of
+ * the sliders: ?a=room.cbvh&b=robot.cbvh&x=0.5&turn=1.
+ */
 
 import { init, Mesh, pose, Relation } from "../dist/index.js";
 
@@ -6,6 +9,7 @@ const canvas = document.querySelector("canvas");
 const context = canvas.getContext("2d");
 const sliders = Object.fromEntries(["x", "y", "z", "turn"].map((name) => [name, document.getElementById(name)]));
 const output = document.getElementById("answer");
+const command = document.getElementById("command");
 const message = document.getElementById("message");
 
 /** The corners of a cube from -0.7 to 0.7: nine numbers for each triangle. */
@@ -53,10 +57,24 @@ class Body {
         return new Body(file.name, isBaked ? Mesh.open(bytes) : Mesh.bakeFile(file.name, bytes));
     }
 
+    /** A mesh that is loaded from an address. */
+    static async at(address) {
+        const response = await fetch(address);
+        if (!response.ok) {
+            throw new Error(`${address}: status ${response.status}`);
+        }
+        return Body.of(new File([await response.blob()], new URL(response.url).pathname.split("/").pop()));
+    }
+
     /** The longest side of its box. */
     get size() {
         const [x0, y0, z0, x1, y1, z1] = this.mesh.bounds;
         return Math.max(x1 - x0, y1 - y0, z1 - z0) || 1;
+    }
+
+    /** The middle of its box. */
+    get middle() {
+        return [0, 1, 2].map((axis) => (this.mesh.bounds[axis] + this.mesh.bounds[axis + 3]) / 2);
     }
 }
 
@@ -67,7 +85,7 @@ function placeB() {
     const scale = a.size / 5;
     const [x, y, z, turn] = ["x", "y", "z", "turn"].map((name) => Number(sliders[name].value));
     const half = turn / 2;
-    return pose([x * scale, y * scale, z * scale], [Math.sin(half), 0, 0, Math.cos(half)]);
+    return pose([x * scale, y * scale, z * scale], [0, 0, Math.sin(half), Math.cos(half)]);
 }
 
 /** The name of the relation, or the error if a file was baked without topology. */
@@ -92,10 +110,13 @@ function update() {
         collide ? `${contacts.length / 4} pairs of triangles touch` : `${nearest.distance} mesh units apart`,
         `certainly ${nearest.lower} to ${nearest.upper}`,
         `triangle ${nearest.triangleA} of A, triangle ${nearest.triangleB} of B`,
-        `${relation.replaceAll("_", " ").toLowerCase()}; asked in ${took.toFixed(2)} ms`,
+        `relation: ${relation.replaceAll("_", " ").toLowerCase()}; computed in ${took.toFixed(2)} ms`,
     ].join("\n");
     const triangles = [a.mesh.triangleCount, b.mesh.triangleCount];
-    document.documentElement.dataset.answer = JSON.stringify({ collide, distance: nearest.distance, relation, triangles });
+    const { distance, lower, upper } = nearest;
+    document.documentElement.dataset.answer = JSON.stringify({ collide, distance, lower, upper, relation, triangles });
+    command.parentElement.hidden = ![a, b].every((body) => body.name.includes("."));
+    command.textContent = `cbvh query ${a.name} ${b.name} --mode distance --pose "${[...at].join(" ")}"`;
     draw(at, nearest, contacts);
 }
 
@@ -103,10 +124,14 @@ function update() {
 function draw(at, nearest, contacts) {
     const scale = canvas.height / (1.3 * a.size);
     const tilt = 0.5;
-    const project = ([x, y, z]) => [
-        canvas.width / 2 + scale * (y - 0.25 * x),
-        canvas.height / 2 - scale * (z * Math.cos(tilt) - x * Math.sin(tilt)),
-    ];
+    const middle = a.middle;
+    const project = (point) => {
+        const [x, y, z] = point.map((value, axis) => value - middle[axis]);
+        return [
+            canvas.width / 2 + scale * (y - 0.25 * x),
+            canvas.height / 2 - scale * (z * Math.cos(tilt) - x * Math.sin(tilt)),
+        ];
+    };
     const place = ([x, y, z]) => [0, 4, 8].map((row) => at[row] * x + at[row + 1] * y + at[row + 2] * z + at[row + 3]);
     const [inA, inB] = [new Set(), new Set()];
     for (let k = 0; k < contacts.length; k += 4) {
@@ -179,8 +204,16 @@ canvas.addEventListener("pointermove", (event) => {
 
 try {
     await init();
-    [a, b] = [new Body("A", Mesh.bake(ringTriangles())), new Body("B", Mesh.bake(cubeTriangles))];
+    const given = new URLSearchParams(location.search);
+    const meshAt = (name) => given.has(name) && Body.at(given.get(name));
+    a = (await meshAt("a")) || new Body("A", Mesh.bake(ringTriangles()));
+    b = (await meshAt("b")) || new Body("B", Mesh.bake(cubeTriangles));
+    for (const [name, slider] of Object.entries(sliders)) {
+        slider.value = given.get(name) ?? slider.value;
+    }
     const swap = (old, found) => (found(), old);
+    document.getElementById("drop-a").textContent = a.name;
+    document.getElementById("drop-b").textContent = b.name;
     takeFiles(document.getElementById("drop-a"), (body) => swap(a, () => (a = body)));
     takeFiles(document.getElementById("drop-b"), (body) => swap(b, () => (b = body)));
     Object.values(sliders).forEach((slider) => slider.addEventListener("input", update));
