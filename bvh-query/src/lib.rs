@@ -89,6 +89,7 @@ mod numerics;
 mod pose;
 mod query;
 mod scene;
+mod stop;
 mod traverse;
 
 pub use error::{FileChange, NumberError, OpenError, QueryError};
@@ -134,6 +135,7 @@ pub use scene::{
     Groups, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact, SceneDistance,
     SceneError, SceneMotionAnswer, ScenePair, SceneRayHit, SceneSignedDistance,
 };
+pub use stop::Stop;
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///

@@ -6,7 +6,8 @@ use crate::frame::{Frame, Point, each};
 use crate::rod::are_within;
 use crate::screening::Screening;
 use crate::setting::{Pair, Part, Setting};
-use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance};
+use bvh_query::{BackendError, Distance, PenetrationOptions, Querier, QueryError, SignedDistance, Stop};
+use std::sync::Arc;
 
 /// A pair that may be near: its bodies, how far the balls around its parts are apart, and its number.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +20,8 @@ pub(crate) struct Candidate {
 /// A querier, and where everything is in the configuration in question.
 pub(crate) struct Asker {
     pub(crate) querier: Querier,
+    /// Stops questions when it is set. The querier has it, too.
+    stop: Option<Arc<dyn Stop>>,
     /// The frames of groups of links, in the world.
     pub(crate) groups: Vec<Frame>,
     /// The balls around the parts, in the world.
@@ -41,9 +44,11 @@ impl std::fmt::Debug for Asker {
 }
 
 impl Clone for Asker {
-    /// Returns one that remembers nothing.
+    /// Returns one that remembers nothing, with the same settings.
     fn clone(&self) -> Self {
-        Self::with(Querier::with_backend(self.querier.backend()))
+        let mut asker = Self::with(Querier::with_backend(self.querier.backend()));
+        asker.set_stop(self.stop().cloned());
+        asker
     }
 }
 
@@ -55,6 +60,7 @@ impl Asker {
     pub(crate) fn with(querier: Querier) -> Self {
         Self {
             querier,
+            stop: None,
             groups: Vec::new(),
             balls: Balls::default(),
             slack: 0.0,
@@ -65,8 +71,27 @@ impl Asker {
         }
     }
 
+    /// Stops questions when a flag is set.
+    pub(crate) fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
+        self.querier.set_stop(stop.clone());
+        self.stop = stop;
+    }
+
+    pub(crate) fn stop(&self) -> Option<&Arc<dyn Stop>> {
+        self.stop.as_ref()
+    }
+
+    /// Returns an error if questions have to stop. What balls and rods decide never asks the querier.
+    pub(crate) fn go_on(&self) -> Result<(), QueryError> {
+        match &self.stop {
+            Some(stop) if stop.is_set() => Err(QueryError::Stopped),
+            _ => Ok(()),
+        }
+    }
+
     /// Goes to a configuration.
     pub(crate) fn place(&mut self, setting: &Setting, joints: &[f64]) -> Result<(), RobotError> {
+        self.go_on()?;
         setting.model.check(joints)?;
         setting.model.place(joints, &mut self.groups);
         self.slack = ROUNDING * self.balls.place(&setting.layout, &self.groups);
@@ -327,8 +352,11 @@ pub(crate) struct Nearest {
     pub(crate) points: [Point; 2],
 }
 
-/// Names the pair whose question has no answer.
+/// Names the pair whose question has no answer, unless all questions were stopped.
 pub(crate) fn failed(setting: &Setting, pair: &Pair, source: QueryError) -> RobotError {
+    if source == QueryError::Stopped {
+        return source.into();
+    }
     let [a, b] = setting.names([pair.a, pair.b]);
     RobotError::Pair { a, b, source }
 }

@@ -8,7 +8,7 @@
 use crate::around::{Around, long};
 use crate::frame::{Frame, Point, each, length};
 use crate::setting::{OFF_RIGID, Part, Setting};
-use bvh_query::{Querier, Side};
+use bvh_query::{Querier, QueryError, Side};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -116,8 +116,8 @@ impl Clearances {
         self.keep(cell, bound, is_tight)
     }
 
-    /// Returns the distance of the middle of a cell from the shapes, and keeps it. It is no less than that from boxes, so that what was
-    /// beyond a distance before still is.
+    /// Returns the distance of the middle of a cell from the shapes, and keeps it, unless the question was stopped. It is no less than that
+    /// from boxes, so that what was beyond a distance before still is.
     #[inline(never)]
     fn shapes(&self, setting: &Setting, querier: &mut Querier, cell: &Cell) -> Held {
         let point = cell.middle(self.side);
@@ -126,7 +126,10 @@ impl Clearances {
         let mut least = exact.fold(f64::INFINITY, f64::min);
         for still in self.still.iter().filter(|still| !still.around.is_tight) {
             if still.distance_of(&point) < least {
-                least = least.min(still.distance_of_shape(setting, querier, &point, least));
+                match still.distance_of_shape(setting, querier, &point, least) {
+                    Some(distance) => least = least.min(distance),
+                    None => return Held::below(self.distance_of_bounds(&point).0, false),
+                }
             }
         }
         let (of_bounds, _) = self.distance_of_bounds(&point);
@@ -285,18 +288,29 @@ impl Still {
     }
 
     /// Returns a lower bound of how far a point is from the shape, or of what is less than `within`. 0 where there is no answer: the
-    /// question about both parts will tell why.
-    fn distance_of_shape(&self, setting: &Setting, querier: &mut Querier, point: &Point, within: f64) -> f64 {
+    /// question about both parts will tell why. `None` if the question was stopped.
+    fn distance_of_shape(
+        &self,
+        setting: &Setting,
+        querier: &mut Querier,
+        point: &Point,
+        within: f64,
+    ) -> Option<f64> {
         let shape = &setting.parts[self.part].shape;
         let at = self.frame.find(*point);
         // Deep inside a solid, no surface need be near.
         let may_be_inside = shape.shape().is_solid() && self.distance_of(point) == 0.0;
-        if may_be_inside && !querier.side(shape, at).is_ok_and(|side| side == Side::Outside) {
-            return 0.0;
+        if may_be_inside {
+            match querier.side(shape, at) {
+                Ok(Side::Outside) => {}
+                Err(QueryError::Stopped) => return None,
+                _ => return Some(0.0),
+            }
         }
         match querier.closest_point(shape, at, within) {
-            Ok(closest) => closest.map_or(within, |closest| closest.lower) - self.off_rigid(&at),
-            Err(_) => 0.0,
+            Ok(closest) => Some(closest.map_or(within, |closest| closest.lower) - self.off_rigid(&at)),
+            Err(QueryError::Stopped) => None,
+            Err(_) => Some(0.0),
         }
     }
 }

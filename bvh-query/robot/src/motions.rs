@@ -188,6 +188,7 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<bool, RobotError> {
+        self.go_on()?;
         let bounds = check(setting, edge)?;
         // Pairs that stay apart would not refuse them.
         options.check()?;
@@ -315,6 +316,7 @@ impl Asker {
         edge: &Edge,
         options: &MotionOptions,
     ) -> Result<RobotMotion, RobotError> {
+        self.go_on()?;
         let bounds = check(setting, edge)?;
         // Pairs that stay apart would not refuse them.
         options.check()?;
@@ -408,6 +410,10 @@ struct Touches<'a> {
 }
 
 impl Test for Touches<'_> {
+    fn go_on(&self) -> Result<(), QueryError> {
+        self.asker.go_on()
+    }
+
     fn querier(&mut self) -> &mut Querier {
         &mut self.asker.querier
     }

@@ -13,7 +13,7 @@ use crate::shapes::Shapes;
 use crate::source::Source;
 use crate::srdf::{self, Group, Semantics, State};
 use crate::urdf::{self, Element};
-use bvh_query::{Backend, NumberError, OwnedShape, Pose, Querier, QueryError};
+use bvh_query::{Backend, NumberError, OwnedShape, Pose, Querier, QueryError, Stop};
 use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -84,6 +84,7 @@ impl Clone for Robot {
         self.source = Arc::clone(&source.source);
         self.semantics = Arc::clone(&source.semantics);
         self.warnings = Arc::clone(&source.warnings);
+        self.asker.set_stop(source.asker.stop().cloned());
         self.allowed = Arc::clone(&source.allowed);
         self.is_stale = source.is_stale;
     }
@@ -168,7 +169,17 @@ impl Robot {
     /// Sets the backend that answers questions from now on. Answers do not depend on it. The portable backend replaces one that the
     /// CPU lacks. A clone has the backend of the original.
     pub fn set_backend(&mut self, backend: Backend) {
+        let stop = self.asker.stop().cloned();
         self.asker = Asker::with(Querier::with_backend(backend));
+        self.asker.set_stop(stop);
+    }
+
+    /// Stops each query from now on when the flag is set, as [`Querier::set_stop`] does. The query then ends with
+    /// [`RobotError::Query`] and [`QueryError::Stopped`], and has no result for any configuration or motion. Clones share the flag.
+    ///
+    /// Queries read the flag before each configuration and each motion, too. Reading a robot from its files is not stopped.
+    pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
+        self.asker.set_stop(stop);
     }
 
     /// Returns the name of the robot.

@@ -7,7 +7,7 @@ use crate::frame::{Point, each, length};
 use crate::moments::{Moments, is_too_far};
 use crate::screen::{Screen, Screened};
 use crate::setting::Setting;
-use bvh_query::{MotionOptions, Querier};
+use bvh_query::{MotionOptions, Querier, QueryError};
 
 /// What a thread needs to screen.
 #[derive(Default)]
@@ -59,6 +59,9 @@ pub(crate) struct Search<'a> {
 pub(crate) trait Test {
     fn querier(&mut self) -> &mut Querier;
 
+    /// Returns an error if the question has to stop.
+    fn go_on(&self) -> Result<(), QueryError>;
+
     /// Says whether a pair is a hit in the middle of a step.
     fn is_hit(&mut self, pair: usize, step: usize) -> Result<bool, RobotError>;
 }
@@ -95,6 +98,7 @@ impl<'a> Search<'a> {
                 continue;
             };
             let field = &fields[field];
+            self.test.go_on()?;
             self.limit = self.limit_of(&[of], clearance + tolerance.unwrap_or(of.tolerance));
             let mut steps = 0;
             if self.field(of, field, of.root, [0, self.steps], &mut Near::Some(&mut steps))? {
@@ -106,6 +110,7 @@ impl<'a> Search<'a> {
         }
         self.find_middles();
         for &number in &screen.mutual {
+            self.test.go_on()?;
             let pair = &self.setting.pairs[number];
             let [a, b] = [pair.a, pair.b].map(|part| &screen.parts[part]);
             let tolerance = tolerance.unwrap_or(a.tolerance.min(b.tolerance));
@@ -141,6 +146,7 @@ impl<'a> Search<'a> {
         self.of.likely = likely;
         // Now what it comes near.
         for (of, field, steps) in near {
+            self.test.go_on()?;
             self.limit = self.limit_of(&[of], clearance + tolerance.unwrap_or(of.tolerance));
             let first = self.of.found.len();
             self.field(of, field, of.root, [0, self.steps], &mut Near::All { steps, first })?;
@@ -393,6 +399,10 @@ mod tests {
     impl Test for Nothing {
         fn querier(&mut self) -> &mut Querier {
             &mut self.0
+        }
+
+        fn go_on(&self) -> Result<(), QueryError> {
+            Ok(())
         }
 
         fn is_hit(&mut self, _: usize, _: usize) -> Result<bool, RobotError> {

@@ -25,8 +25,8 @@ use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 use crate::query::regions::ContactRegions;
 use crate::query::tracker::Tracker;
+use crate::stop::Stop;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Asks about many poses or motions of one pair of meshes, on all threads of the rayon pool it is called in.
 ///
@@ -88,7 +88,7 @@ impl<'a> Batch<'a> {
 
     /// Stops each question when the flag is set, as [`Querier::set_stop`] does. The question then ends with
     /// [`QueryError::Stopped`], and has no answer for any pose.
-    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+    pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
         self.pool.stop = stop;
     }
 

@@ -9,10 +9,10 @@
 
 use crate::isa::Backend;
 use crate::query::querier::Querier;
+use crate::stop::Stop;
 use std::fmt;
 #[cfg(feature = "parallel")]
 use std::ops::Range;
-use std::sync::atomic::AtomicBool;
 #[cfg(feature = "parallel")]
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,7 +23,7 @@ pub(crate) struct Pool {
     /// The budget of each query.
     pub(crate) budget: u64,
     /// Stops each query when it is set.
-    pub(crate) stop: Option<Arc<AtomicBool>>,
+    pub(crate) stop: Option<Arc<dyn Stop>>,
     /// In boxes, because a querier takes some KiB, which would be copied whenever it is lent.
     idle: Mutex<Vec<Box<Querier>>>,
 }

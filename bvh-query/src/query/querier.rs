@@ -10,10 +10,10 @@ use crate::query::pair_search::BoundedPair;
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::probe::placed::IntoObject;
 use crate::query::stats::QueryStats;
+use crate::stop::Stop;
 use crate::traverse::budget::Budget;
 use crate::traverse::walk_memory::WalkMemory;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Asks questions about two meshes.
 ///
@@ -125,8 +125,9 @@ impl Querier {
         self.budget = Budget::new(visits).stopped_by(self.budget.stop().cloned());
     }
 
-    /// Stops each query from now on when another thread, a timer or a signal handler sets the flag. The query then ends
-    /// with [`QueryError::Stopped`], and so does each later one until the flag is cleared. `None` removes the flag.
+    /// Stops each query from now on when another thread, a timer or a signal handler sets the flag, or when the function that stands
+    /// in its place returns true. The query then ends with [`QueryError::Stopped`], and so does each later one until the flag is
+    /// cleared. `None` removes the flag.
     ///
     /// A query reads the flag before its first visit and after each 256 visits ([`Querier::set_budget`]), so it ends within
     /// a millisecond or so. What is not charged to a budget is not stopped either: the first check of a list of duplicates or of the
@@ -135,6 +136,7 @@ impl Querier {
     /// ```
     /// use bvh_query::{Bvh, Pose, Querier, QueryError};
     /// use std::sync::{Arc, atomic::{AtomicBool, Ordering}};
+    /// use std::time::{Duration, Instant};
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -146,10 +148,14 @@ impl Querier {
     ///
     /// stop.store(true, Ordering::Relaxed); // on any thread
     /// assert_eq!(querier.collide(&mesh, &mesh, &Pose::IDENTITY), Err(QueryError::Stopped));
+    ///
+    /// let end = Instant::now() + Duration::from_secs(1);
+    /// querier.set_stop(Some(Arc::new(move || Instant::now() > end)));
+    /// assert!(querier.collide(&mesh, &mesh, &Pose::IDENTITY)?);
     /// # Ok(())
     /// # }
     /// ```
-    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+    pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
         self.budget = std::mem::take(&mut self.budget).stopped_by(stop);
     }
 

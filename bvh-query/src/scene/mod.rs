@@ -36,10 +36,10 @@ use crate::file::shape::check_radius;
 use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
 use crate::query::stats::QueryStats;
+use crate::stop::Stop;
 use contents::{Contents, check_world};
 use instance::Instance;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use trackers::Trackers;
 use workers::Workers;
 
@@ -256,7 +256,7 @@ impl Scene {
     /// Stops each question when the flag is set, as [`Querier::set_stop`](crate::Querier::set_stop) does. The error is
     /// [`SceneError::Pair`] or [`SceneError::Instance`] with [`QueryError::Stopped`](crate::QueryError::Stopped), or
     /// [`SceneError::Query`] with it in the broad phase. Copies of the scene share the flag.
-    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+    pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
         self.workers.pool.stop = stop;
     }
 

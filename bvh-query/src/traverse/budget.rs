@@ -1,11 +1,11 @@
 //! How many visits a query may make, and whether it may go on.
 //!
-//! A flag can stop a query at any time. The count of visits pays for it: with a flag, a query gets its visits in portions, and
+//! A [`Stop`] can end a query at any time. The count of visits pays for it: with one, a query gets its visits in portions, and
 //! the flag is read when a portion is used up. So a visit costs as much with a flag as without.
 
 use crate::error::QueryError;
+use crate::stop::Stop;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The number of visits that a look ahead may make beyond those of the query. They cost less than finding out whether
 /// they pay.
@@ -25,7 +25,7 @@ pub(crate) struct Budget {
     portion: u64,
     behind: u64,
     /// Stops the query when it is set.
-    stop: Option<Arc<AtomicBool>>,
+    stop: Option<Arc<dyn Stop>>,
 }
 
 impl Budget {
@@ -35,13 +35,13 @@ impl Budget {
     }
 
     /// The same budget, for queries that a flag may stop.
-    pub(crate) fn stopped_by(self, stop: Option<Arc<AtomicBool>>) -> Self {
+    pub(crate) fn stopped_by(self, stop: Option<Arc<dyn Stop>>) -> Self {
         let left = self.left();
         Self { stop, ..self }.with_left(left)
     }
 
     /// The flag that may stop the query.
-    pub(crate) fn stop(&self) -> Option<&Arc<AtomicBool>> {
+    pub(crate) fn stop(&self) -> Option<&Arc<dyn Stop>> {
         self.stop.as_ref()
     }
 
@@ -124,8 +124,7 @@ impl Budget {
     /// Reads the flag.
     pub(crate) fn go_on(&self) -> Result<(), QueryError> {
         match &self.stop {
-            // Nothing else is read that depends on it.
-            Some(stop) if stop.load(Ordering::Relaxed) => Err(QueryError::Stopped),
+            Some(stop) if stop.is_set() => Err(QueryError::Stopped),
             _ => Ok(()),
         }
     }

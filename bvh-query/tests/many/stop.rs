@@ -9,7 +9,8 @@ use bvh_query::{
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Instant;
 
 fn flag(is_set: bool) -> Arc<AtomicBool> {
     Arc::new(AtomicBool::new(is_set))
@@ -162,4 +163,23 @@ fn batches_are_stopped() {
             assert!(probes.first_hits(&rays).is_ok());
         });
     }
+}
+
+#[test]
+fn a_function_stops_a_query() {
+    const COUNT: usize = 512;
+    let mesh = baked(&fan(COUNT));
+    let mut querier = Querier::new().unwrap();
+    let all = querier.contacts(&mesh, &mesh, &Pose::IDENTITY).unwrap();
+    assert_eq!(all.len(), COUNT * COUNT);
+    let reads = Arc::new(AtomicUsize::new(0));
+    let counted = reads.clone();
+    querier.set_stop(Some(Arc::new(move || counted.fetch_add(1, Ordering::Relaxed) == 3)));
+    assert_eq!(querier.contacts(&mesh, &mesh, &Pose::IDENTITY), Err(QueryError::Stopped));
+    assert_eq!(reads.load(Ordering::Relaxed), 4);
+    assert_eq!(querier.contacts(&mesh, &mesh, &Pose::IDENTITY), Ok(all));
+    // A time that has passed.
+    let end = Instant::now();
+    querier.set_stop(Some(Arc::new(move || Instant::now() >= end)));
+    assert_eq!(querier.collide(&mesh, &mesh, &Pose::IDENTITY), Err(QueryError::Stopped));
 }

@@ -10,6 +10,7 @@ mod misuse;
 mod near_pairs;
 mod parts;
 mod questions;
+mod stop;
 mod tree;
 mod turns;
 mod uris;

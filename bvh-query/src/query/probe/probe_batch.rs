@@ -15,9 +15,9 @@ use crate::query::probe::ray::{All, Any, First, Ray, RayHit, Scaled};
 use crate::query::probe::segment::{MeetsSegment, check_margin};
 use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
+use crate::stop::Stop;
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Probes in a run of one thread.
 const PROBES_PER_RUN: usize = 256;
@@ -62,7 +62,7 @@ impl<'a> ProbeBatch<'a> {
 
     /// Stops each question when the flag is set, as [`Querier::set_stop`] does. The question then ends with
     /// [`QueryError::Stopped`], and has no answer for any probe.
-    pub fn set_stop(&mut self, stop: Option<Arc<AtomicBool>>) {
+    pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
         self.pool.stop = stop;
     }
 
