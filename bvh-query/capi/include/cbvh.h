@@ -33,9 +33,9 @@
  * time. Only one thread at a time may use a querier or a tracker; a second one gets CBVH_BUSY. Make one querier for each
  * thread. A question is about a scene or a robot as it is when the question begins. Other threads may change it
  * meanwhile, and nobody waits for a question. A mesh, a path, a scene or a robot may be freed while other threads use
- * it: it lives until their questions end. cbvh_querier_set_parallel, cbvh_scene_set_parallel and cbvh_robot_set_parallel
- * let one question use all cores. The number of threads is that of the environment variable RAYON_NUM_THREADS or,
- * without it, of the cores.
+ * it: it lives until their questions end. A flag (cbvh_stop) may be set, cleared and freed on any thread at any time.
+ * cbvh_querier_set_parallel, cbvh_scene_set_parallel and cbvh_robot_set_parallel let one question use all cores. The
+ * number of threads is that of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
  *
  * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
  * command cbvh and of the Rust library. They do not depend on how the calling thread rounds (fesetround), whether it
@@ -102,7 +102,9 @@ enum {
     /* A function of the caller gave no pose or no sagitta. */
     CBVH_CALLBACK_FAILED = 10,
     /* A defect of this library. The handle that was in use can only be freed. Please report it. */
-    CBVH_INTERNAL = 11
+    CBVH_INTERNAL = 11,
+    /* The flag of the querier, scene or robot was set before there was an answer: see cbvh_stop_new. */
+    CBVH_STOPPED = 12
 };
 
 /* Returns the message of the last failure on this thread, in UTF-8, or an empty text. It is never NULL, and stays valid
@@ -127,6 +129,8 @@ typedef struct cbvh_path { uint64_t id; } cbvh_path;
 typedef struct cbvh_scene { uint64_t id; } cbvh_scene;
 /* A robot among obstacles. */
 typedef struct cbvh_robot { uint64_t id; } cbvh_robot;
+/* A flag that stops questions. */
+typedef struct cbvh_stop { uint64_t id; } cbvh_stop;
 
 /* ----------------------------------------------------------------------------------------------------------- poses */
 
@@ -416,6 +420,20 @@ cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
  * duplicates; a component and an object, for a relation; or an interval of a motion. Without a budget, only the sizes
  * of the files limit a question. */
 cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
+
+/* Makes a flag that is not set. Any number of queriers, scenes and robots may have it. While it is set, each of their
+ * questions ends with CBVH_STOPPED: one that is under way within a millisecond or so, and a new one at once. A flag that is
+ * not set affects no answer. */
+cbvh_status cbvh_stop_new(cbvh_stop *stop);
+/* Sets a flag, on any thread, but not in a signal handler. */
+cbvh_status cbvh_stop_set(cbvh_stop stop);
+/* Clears a flag. Questions that begin afterwards are answered. */
+cbvh_status cbvh_stop_clear(cbvh_stop stop);
+/* Frees the handle of a flag. Those that have the flag keep it as it is. */
+cbvh_status cbvh_stop_free(cbvh_stop stop);
+/* Gives a flag to a querier, in place of the one that it has; a handle of 0 removes it. The first check of a list of
+ * duplicates or of the topology of a file, and the boxes that an open file gets for its rays, are not stopped. */
+cbvh_status cbvh_querier_set_stop(cbvh_querier querier, cbvh_stop stop);
 
 /* The work of the last question. */
 typedef struct cbvh_stats {
@@ -1118,6 +1136,9 @@ cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
  * cbvh_querier_set_budget, each comparison of a box with up to sixteen others in the search for near pairs, and each pair
  * of boxes that these leave. If there are several threads, each may make this many before they stop. */
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
+/* Gives a flag to a scene, as cbvh_querier_set_stop does. Clones share it. Questions that are under way keep the flag that
+ * they began with. */
+cbvh_status cbvh_scene_set_stop(cbvh_scene scene, cbvh_stop stop);
 
 /* Adds a mesh at a pose in the world. The rotation must be rigid to within 2^-23, and the translation at most 2^118
  * along each axis. `name` may be NULL; else no other instance may have it. `instance` may be NULL. The handle of the
@@ -1367,6 +1388,8 @@ cbvh_status cbvh_robot_clone(cbvh_robot robot, cbvh_robot *other);
 cbvh_status cbvh_robot_free(cbvh_robot robot);
 /* Lets questions about many configurations or motions use all cores (1) or one (0, the default). */
 cbvh_status cbvh_robot_set_parallel(cbvh_robot robot, int32_t parallel);
+/* Gives a flag to a robot, as cbvh_scene_set_stop does. */
+cbvh_status cbvh_robot_set_stop(cbvh_robot robot, cbvh_stop stop);
 
 /* How much a robot has. */
 typedef struct cbvh_robot_counts {

@@ -748,6 +748,22 @@ private:
     detail::Handle<cbvh_path, cbvh_path_free> handle_;
 };
 
+/// A flag that stops the questions of those that have it: see cbvh_stop_new. Any thread may set and clear it.
+class Stop {
+public:
+    Stop() {
+        cbvh_stop stop{0};
+        check(cbvh_stop_new(&stop));
+        handle_ = detail::Handle<cbvh_stop, cbvh_stop_free>(stop);
+    }
+    cbvh_stop raw() const noexcept { return handle_.raw(); }
+    void set() const { check(cbvh_stop_set(raw())); }
+    void clear() const { check(cbvh_stop_clear(raw())); }
+
+private:
+    detail::Handle<cbvh_stop, cbvh_stop_free> handle_;
+};
+
 /// Answers questions about meshes. Make one for each thread. If a list of contacts or hits is longer than 64 and than
 /// the last list, the library asks for it twice, because the first time only counts its elements.
 class Querier {
@@ -761,6 +777,9 @@ public:
     /// Lets questions about many poses, paths or probes use all cores.
     void set_parallel(bool parallel) { check(cbvh_querier_set_parallel(raw(), parallel)); }
     void set_budget(std::uint64_t visits) { check(cbvh_querier_set_budget(raw(), visits)); }
+    /// While the flag is set, questions throw an Error of CBVH_STOPPED. The querier keeps the flag; nullptr removes it.
+    void set_stop(const Stop &stop) { check(cbvh_querier_set_stop(raw(), stop.raw())); }
+    void set_stop(std::nullptr_t) { check(cbvh_querier_set_stop(raw(), cbvh_stop{0})); }
     Stats stats() const {
         Stats stats{};
         check(cbvh_querier_stats(raw(), &stats));
@@ -1232,6 +1251,9 @@ public:
     void set_parallel(bool parallel) { check(cbvh_scene_set_parallel(raw(), parallel)); }
     void set_tracking(bool tracking) { check(cbvh_scene_set_tracking(raw(), tracking)); }
     void set_budget(std::uint64_t visits) { check(cbvh_scene_set_budget(raw(), visits)); }
+    /// See Querier::set_stop. Copies share the flag.
+    void set_stop(const Stop &stop) { check(cbvh_scene_set_stop(raw(), stop.raw())); }
+    void set_stop(std::nullptr_t) { check(cbvh_scene_set_stop(raw(), cbvh_stop{0})); }
     Stats stats() const {
         Stats stats{};
         check(cbvh_scene_stats(raw(), &stats));
@@ -1587,6 +1609,9 @@ public:
     cbvh_robot raw() const noexcept { return handle_.raw(); }
 
     void set_parallel(bool parallel) { check(cbvh_robot_set_parallel(raw(), parallel)); }
+    /// See Querier::set_stop. Copies share the flag.
+    void set_stop(const Stop &stop) { check(cbvh_robot_set_stop(raw(), stop.raw())); }
+    void set_stop(std::nullptr_t) { check(cbvh_robot_set_stop(raw(), cbvh_stop{0})); }
 
     std::string name() const {
         return detail::text([&](char *buffer, std::size_t capacity, std::size_t *length) {

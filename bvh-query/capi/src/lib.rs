@@ -30,6 +30,7 @@ mod scene;
 mod shapes;
 mod shared;
 mod status;
+mod stops;
 mod table;
 mod trackers;
 mod types;

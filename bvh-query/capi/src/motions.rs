@@ -34,14 +34,14 @@ impl Question {
     ) -> i32 {
         let ask = |asker: &mut Asker| {
             let parallel = asker.uses_all_cores();
-            let Asker { querier, budget, at_hand, probes, .. } = asker;
+            let Asker { querier, limits, at_hand, probes, .. } = asker;
             let (a, b) = at_hand.pair(self.a, self.b)?;
             let paths = read(probes)?;
             // SAFETY: the caller vouches for it.
             let (options, mut room) =
                 unsafe { (options("options", self.options)?.read(), Room::new("answers", answers, count)?) };
             if parallel {
-                let found = all(&batch(a, b, querier, *budget), &paths, &options);
+                let found = all(&batch(a, b, querier, limits), &paths, &options);
                 paths.iter().try_for_each(check)?;
                 return room.fill(found?.into_iter().map(Ok::<_, QueryError>), R::from);
             }

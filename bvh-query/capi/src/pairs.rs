@@ -5,7 +5,7 @@ use crate::entry::{entry, questions, write};
 use crate::input::{self, reserve};
 use crate::output::{Lists, Room};
 use crate::poses;
-use crate::queriers::{self, Asker};
+use crate::queriers::{self, Asker, Limits};
 use crate::status::Failure;
 use crate::types::{ContactRow, DistanceChoices, DistanceRow, MeshHandle, PoseRows, QuerierHandle};
 use bvh_query::{Batch, Pose, Querier, QueryError, Shape, displacement};
@@ -31,11 +31,11 @@ impl Question {
     ) -> Result<(), Failure> {
         queriers::with(self.querier, |asker| {
             let parallel = asker.uses_all_cores();
-            let Asker { querier, budget, at_hand, probes, .. } = asker;
+            let Asker { querier, limits, at_hand, probes, .. } = asker;
             let (a, b) = at_hand.pair(self.a, self.b)?;
             // SAFETY: the caller vouches for it.
             let poses = unsafe { poses::read_many("poses", self.poses, self.count, &mut probes.poses) }?;
-            let batch = parallel.then(|| batch(a, b, querier, *budget));
+            let batch = parallel.then(|| batch(a, b, querier, limits));
             ask(querier, batch, [a, b], poses)
         })
     }
@@ -80,9 +80,10 @@ impl Question {
 }
 
 /// Makes what asks about two meshes on all cores.
-pub(crate) fn batch<'a>(a: Shape<'a>, b: Shape<'a>, querier: &Querier, budget: u64) -> Batch<'a> {
+pub(crate) fn batch<'a>(a: Shape<'a>, b: Shape<'a>, querier: &Querier, limits: &Limits) -> Batch<'a> {
     let mut batch = Batch::with_backend(a, b, querier.backend());
-    batch.set_budget(budget);
+    batch.set_budget(limits.budget);
+    batch.set_stop(limits.stop.clone());
     batch
 }
 

@@ -31,7 +31,7 @@ impl Question {
     ) -> i32 {
         let ask = |asker: &mut Asker| {
             let parallel = asker.uses_all_cores();
-            let Asker { querier, budget, at_hand, probes, .. } = asker;
+            let Asker { querier, limits, at_hand, probes, .. } = asker;
             let shape = at_hand.one("mesh", self.mesh)?;
             // SAFETY: the caller vouches for it.
             let pose = optional(self.pose, |pose| unsafe { poses::read("pose", pose) })?;
@@ -39,7 +39,8 @@ impl Question {
             let probes = read(probes)?;
             let batch = parallel.then(|| {
                 let mut batch = ProbeBatch::with_backend(placed, querier.backend());
-                batch.set_budget(*budget);
+                batch.set_budget(limits.budget);
+                batch.set_stop(limits.stop.clone());
                 batch
             });
             ask(querier, batch, placed, probes)

@@ -5,9 +5,11 @@ use crate::cores;
 use crate::entry::{entry, hand_out, write};
 use crate::input::flag;
 use crate::status::Failure;
+use crate::stops;
 use crate::table::{Exclusive, Kind, Table};
-use crate::types::{self, QuerierHandle, StatsRow};
-use bvh_query::{Pose, Querier, Ray};
+use crate::types::{self, QuerierHandle, StatsRow, StopHandle};
+use bvh_query::{Pose, Querier, Ray, Stop};
+use std::sync::Arc;
 
 /// All queriers that are open.
 static QUERIERS: Table<Exclusive<Asker>> = Table::new(Kind::Querier);
@@ -17,7 +19,7 @@ pub(crate) struct Asker {
     pub(crate) querier: Querier,
     /// Whether questions may use all cores, where they are not asked by a function of the caller.
     parallel: bool,
-    pub(crate) budget: u64,
+    pub(crate) limits: Limits,
     pub(crate) at_hand: AtHand,
     /// Memory for what a question is about.
     pub(crate) probes: Probes,
@@ -28,6 +30,12 @@ impl Asker {
     pub(crate) fn uses_all_cores(&self) -> bool {
         self.parallel && cores::may_use_all()
     }
+}
+
+/// What ends a question early, on one core as on all.
+pub(crate) struct Limits {
+    pub(crate) budget: u64,
+    pub(crate) stop: Option<Arc<dyn Stop>>,
 }
 
 #[derive(Default)]
@@ -52,7 +60,8 @@ pub unsafe extern "C" fn cbvh_querier_new(backend: i32, querier: *mut QuerierHan
     let made = || {
         let querier = Querier::with_backend(types::backend("backend", backend)?);
         let (at_hand, probes) = (AtHand::default(), Probes::default());
-        Ok(Exclusive::new(Asker { querier, parallel: false, budget: u64::MAX, at_hand, probes }))
+        let limits = Limits { budget: u64::MAX, stop: None };
+        Ok(Exclusive::new(Asker { querier, parallel: false, limits, at_hand, probes }))
     };
     // SAFETY: the header asks for it.
     unsafe { hand_out(("querier", querier), &QUERIERS, made) }
@@ -77,8 +86,19 @@ pub extern "C" fn cbvh_querier_set_parallel(querier: QuerierHandle, parallel: i3
 pub extern "C" fn cbvh_querier_set_budget(querier: QuerierHandle, visits: u64) -> i32 {
     entry(|| {
         with(querier, |asker| {
-            asker.budget = visits;
+            asker.limits.budget = visits;
             asker.querier.set_budget(visits);
+            Ok(())
+        })
+    })
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn cbvh_querier_set_stop(querier: QuerierHandle, stop: StopHandle) -> i32 {
+    entry(|| {
+        with(querier, |asker| {
+            asker.limits.stop = stops::of(stop)?;
+            asker.querier.set_stop(asker.limits.stop.clone());
             Ok(())
         })
     })

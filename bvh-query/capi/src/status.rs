@@ -21,6 +21,7 @@ pub(crate) enum Status {
     BakeFailed = 9,
     CallbackFailed = 10,
     Internal = 11,
+    Stopped = 12,
 }
 
 /// Why a function fails.
@@ -51,6 +52,7 @@ fn of_query(error: &QueryError) -> Status {
         QueryError::Damaged(_) => Status::Damaged,
         QueryError::File { .. } => Status::System,
         QueryError::Budget { .. } => Status::Limit,
+        QueryError::Stopped => Status::Stopped,
         _ => Status::InvalidArgument,
     }
 }

@@ -21,6 +21,7 @@ pub(crate) enum Kind {
     Path,
     Scene,
     Robot,
+    Stop,
 }
 
 /// The highest byte of the first kind.
@@ -29,7 +30,7 @@ const FIRST_KIND: u64 = 0xC1;
 /// Returns the name of the kind that a handle has, if it is one.
 fn name_of_kind(handle: u64) -> Option<&'static str> {
     let kind = (handle >> 56).checked_sub(FIRST_KIND)?;
-    ["mesh", "querier", "tracker", "path", "scene", "robot"].get(kind as usize).copied()
+    ["mesh", "querier", "tracker", "path", "scene", "robot", "stop"].get(kind as usize).copied()
 }
 
 const PARTS: usize = 64;

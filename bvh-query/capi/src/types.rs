@@ -42,7 +42,17 @@ macro_rules! handles {
         )*
     };
 }
-handles!(MeshHandle, QuerierHandle, TrackerHandle, PathHandle, SceneHandle, Instance, RobotHandle, Body);
+handles!(
+    MeshHandle,
+    QuerierHandle,
+    TrackerHandle,
+    PathHandle,
+    SceneHandle,
+    Instance,
+    RobotHandle,
+    Body,
+    StopHandle
+);
 
 structures! {
     PoseRows { rows: [f64; 12] }

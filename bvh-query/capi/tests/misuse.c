@@ -50,6 +50,13 @@ static void handles(void) {
     const cbvh_path no_path = {0};
     FAILS(cbvh_are_free(querier, mesh, mesh, &no_path, 1, NULL, &answer), CBVH_INVALID_HANDLE, "paths[0]: ");
     FAILS(cbvh_path_pose(no_path, 0, &pose), CBVH_INVALID_HANDLE, "path: ");
+    const cbvh_stop no_stop = {0}, a_querier = {querier.id};
+    FAILS(cbvh_stop_set(no_stop), CBVH_INVALID_HANDLE, "stop: expected the handle of an open stop, found 0");
+    FAILS(cbvh_stop_clear(no_stop), CBVH_INVALID_HANDLE, "stop: ");
+    FAILS(cbvh_querier_set_stop(querier, a_querier), CBVH_INVALID_HANDLE, "stop: expected the handle of an open stop");
+    FAILS(cbvh_scene_set_stop(scene, a_querier), CBVH_INVALID_HANDLE, "found the handle of a querier");
+    FAILS(cbvh_stop_new(NULL), CBVH_INVALID_ARGUMENT, "stop: ");
+    OK(cbvh_stop_free(no_stop));
     const cbvh_scene no_scene = {0};
     FAILS(cbvh_scene_collide(no_scene, &answer), CBVH_INVALID_HANDLE, "scene: ");
     FAILS(cbvh_scene_add(scene, no_mesh, &pose, NULL, NULL), CBVH_INVALID_HANDLE, "mesh: ");

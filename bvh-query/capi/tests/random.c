@@ -27,7 +27,8 @@ static uint64_t any_handle(uint64_t likely) {
 static bool free_any(uint64_t handle) {
     return cbvh_mesh_free((cbvh_mesh){handle}) == CBVH_OK || cbvh_querier_free((cbvh_querier){handle}) == CBVH_OK ||
            cbvh_tracker_free((cbvh_tracker){handle}) == CBVH_OK || cbvh_path_free((cbvh_path){handle}) == CBVH_OK ||
-           cbvh_scene_free((cbvh_scene){handle}) == CBVH_OK || cbvh_robot_free((cbvh_robot){handle}) == CBVH_OK;
+           cbvh_scene_free((cbvh_scene){handle}) == CBVH_OK || cbvh_robot_free((cbvh_robot){handle}) == CBVH_OK ||
+           cbvh_stop_free((cbvh_stop){handle}) == CBVH_OK;
 }
 
 /* What calls may be given: arrays that hold `ELEMENTS` of anything, and numbers that are not plain. */
@@ -140,6 +141,7 @@ int main(int argument_count, char **arguments) {
     cbvh_instance instance;
     cbvh_robot robot;
     cbvh_body body;
+    cbvh_stop stop;
     char urdf[1000];
     CHECK(argument_count == 2);
     snprintf(urdf, sizeof urdf, "%s/robot/robot.urdf", arguments[1]);
@@ -147,6 +149,7 @@ int main(int argument_count, char **arguments) {
     OK(cbvh_robot_find(robot, "hand", &body));
     OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
     OK(cbvh_tracker_new(&tracker));
+    OK(cbvh_stop_new(&stop));
     OK(cbvh_path_between(&here, &there, &path));
     OK(cbvh_scene_new(CBVH_BACKEND_BEST, &scene));
     OK(cbvh_scene_add(scene, mesh, &here, "here", &instance));
@@ -164,6 +167,7 @@ int main(int argument_count, char **arguments) {
         const cbvh_instance i = {any_handle(instance.id)};
         const cbvh_robot o = {any_handle(robot.id)};
         const cbvh_body d = {any_handle(body.id)};
+        const cbvh_stop t = {any_handle(stop.id)};
         const char *const links[4] = {"base", "hand", below(8) ? "forearm" : "nothing", below(8) ? "x" : NULL};
         const char *const link = links[below(4)];
         const size_t joint_count = below(8) ? 4 : below(6);
@@ -178,7 +182,7 @@ int main(int argument_count, char **arguments) {
         uint64_t made = 0;
         char name[3] = {(char)('a' + below(26)), 0, 0};
         cbvh_status status = CBVH_OK;
-        switch (below(116)) {
+        switch (below(118)) {
         case 0: status = cbvh_collide(q, a, b, in, n, out); break;
         case 1: status = cbvh_within(q, a, b, in, n, x, out); break;
         case 2: status = cbvh_relations(q, a, b, in, n, out); break;
@@ -309,6 +313,10 @@ int main(int argument_count, char **arguments) {
         case 112: status = below(2) ? cbvh_robot_are_free(o, in, below(4), joint_count, n, options, out)
                                     : cbvh_robot_motions(o, in, below(4), joint_count, n, options, out); break;
         case 113: status = below(2) ? cbvh_mesh_open_edges(a, out, capacity, &count) : cbvh_mesh_open_edge_counts(a, out); break;
+        /* No flag is set, so that questions have answers. */
+        case 115: status = below(2) ? cbvh_stop_new((cbvh_stop *)&made) : cbvh_stop_clear(t); break;
+        case 116: status = below(3) == 0 ? cbvh_querier_set_stop(q, t)
+                                : below(2) ? cbvh_scene_set_stop(s, t) : cbvh_robot_set_stop(o, t); break;
         case 114: status = cbvh_signed_distances(q, a, b, in, n, options, out); break;
         default:
             /* Frees one, as every kind. */
@@ -341,6 +349,7 @@ int main(int argument_count, char **arguments) {
     for (size_t place = 0; place < KEPT; place++) {
         free_any(kept[place]);
     }
+    OK(cbvh_stop_free(stop));
     OK(cbvh_robot_free(robot));
     OK(cbvh_scene_free(scene));
     OK(cbvh_path_free(path));

@@ -6,6 +6,7 @@
 #include "support.h"
 #include <pthread.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #define JOINTS 4
@@ -889,6 +890,52 @@ static void threads(void) {
     OK(cbvh_robot_free(shared));
 }
 
+/* Sets a flag a moment later, while another thread asks. */
+static cbvh_stop stop;
+
+static void *set_soon(void *unused) {
+    const struct timespec moment = {0, 20000000};
+    CHECK(nanosleep(&moment, NULL) == 0);
+    OK(cbvh_stop_set(stop));
+    return unused;
+}
+
+static void stops(int32_t parallel) {
+    enum { MANY = 200000, FEW = 20 };
+    const cbvh_stop no_stop = {0};
+    const cbvh_robot robot = cell();
+    cbvh_robot clone;
+    pthread_t thread;
+    double *const starts = malloc(2 * sizeof(double) * JOINTS * MANY), *const ends = starts + JOINTS * MANY;
+    bool *const are_free = malloc(MANY), expected[FEW], touches;
+    CHECK(starts != NULL && are_free != NULL);
+    random_joints(starts, 2 * (size_t)MANY);
+    OK(cbvh_robot_set_parallel(robot, parallel));
+    OK(cbvh_robot_edges_are_free(robot, starts, ends, JOINTS, FEW, NULL, expected));
+    OK(cbvh_stop_new(&stop));
+    OK(cbvh_robot_set_stop(robot, stop));
+    CHECK(pthread_create(&thread, NULL, set_soon, NULL) == 0);
+    FAILS(cbvh_robot_edges_are_free(robot, starts, ends, JOINTS, MANY, NULL, are_free), CBVH_STOPPED,
+          "found the query stopped");
+    CHECK(pthread_join(thread, NULL) == 0);
+    FAILS(cbvh_robot_collide(robot, starts, JOINTS, 1, &touches), CBVH_STOPPED, "");
+    OK(cbvh_robot_clone(robot, &clone));
+    FAILS(cbvh_robot_collide(clone, starts, JOINTS, 1, &touches), CBVH_STOPPED, "");
+    OK(cbvh_stop_clear(stop));
+    OK(cbvh_robot_collide(clone, starts, JOINTS, 1, &touches));
+    OK(cbvh_robot_edges_are_free(robot, starts, ends, JOINTS, FEW, NULL, are_free));
+    CHECK(memcmp(are_free, expected, sizeof expected) == 0);
+    OK(cbvh_stop_set(stop));
+    OK(cbvh_robot_set_stop(robot, no_stop));
+    OK(cbvh_robot_edges_are_free(robot, starts, ends, JOINTS, FEW, NULL, are_free));
+    CHECK(memcmp(are_free, expected, sizeof expected) == 0);
+    OK(cbvh_stop_free(stop));
+    OK(cbvh_robot_free(clone));
+    OK(cbvh_robot_free(robot));
+    free(starts);
+    free(are_free);
+}
+
 int main(int count, char **arguments) {
     CHECK(count == 3);
     scratch = arguments[1];
@@ -899,6 +946,7 @@ int main(int count, char **arguments) {
         near_pairs(parallel);
         motions(parallel);
         insides(parallel);
+        stops(parallel);
     }
     turns();
     changes();

@@ -1,8 +1,9 @@
 /* Threads: several with a querier each and one mesh give the same bits; one querier for two is refused; a mesh, a path
  * and a scene may be freed while others use them; many look at a scene; functions of paths ask by themselves; a scene is
- * changed while others ask, and each answer is that of one scene. */
+ * changed while others ask, and each answer is that of one scene; a flag stops questions that other threads ask. */
 #include "support.h"
 #include <pthread.h>
+#include <time.h>
 
 #define THREADS 4
 #define POSES 400
@@ -230,6 +231,87 @@ static void swaps(void) {
     OK(cbvh_mesh_free(meshes[1]));
 }
 
+/* Sets a flag a moment later, while another thread asks. */
+static cbvh_stop stop;
+
+static void *set_soon(void *unused) {
+    const struct timespec moment = {0, 20000000};
+    CHECK(nanosleep(&moment, NULL) == 0);
+    OK(cbvh_stop_set(stop));
+    return unused;
+}
+
+static void stops(void) {
+    /* Triangles that all contain a point, each beside the others: all pairs touch. */
+    enum { TRIANGLES = 4096, INSTANCES = 3 };
+    static double vertices[9 * TRIANGLES];
+    static uint32_t faces[3 * TRIANGLES];
+    const cbvh_stop no_stop = {0};
+    const cbvh_robot no_robot = {0};
+    const cbvh_pose here = CBVH_IDENTITY;
+    cbvh_mesh fan;
+    cbvh_scene many;
+    cbvh_querier querier;
+    cbvh_tracker tracker;
+    pthread_t thread;
+    bool answer;
+    size_t count;
+    for (uint32_t k = 0; k < TRIANGLES; k++) {
+        const double corners[9] = {0, 0, 0, 1, 0, 0, k, 1, 0};
+        memcpy(vertices + 9 * k, corners, sizeof corners);
+        for (uint32_t corner = 0; corner < 3; corner++) {
+            faces[3 * k + corner] = 3 * k + corner;
+        }
+    }
+    OK(cbvh_bake(vertices, 3 * (size_t)TRIANGLES, faces, TRIANGLES, NULL, &fan));
+    OK(cbvh_querier_new(CBVH_BACKEND_BEST, &querier));
+    OK(cbvh_tracker_new(&tracker));
+    OK(cbvh_scene_new(CBVH_BACKEND_BEST, &many));
+    for (int k = 0; k < INSTANCES; k++) {
+        OK(cbvh_scene_add(many, fan, &here, NULL, NULL));
+    }
+    OK(cbvh_stop_new(&stop));
+    OK(cbvh_querier_set_stop(querier, stop));
+    OK(cbvh_scene_set_stop(many, stop));
+    FAILS(cbvh_robot_set_stop(no_robot, stop), CBVH_INVALID_HANDLE, "robot: ");
+    for (int32_t parallel = 0; parallel < 2; parallel++) {
+        OK(cbvh_querier_set_parallel(querier, parallel));
+        OK(cbvh_scene_set_parallel(many, parallel));
+        /* One that is under way. */
+        CHECK(pthread_create(&thread, NULL, set_soon, NULL) == 0);
+        FAILS(cbvh_contacts(querier, fan, fan, &here, 1, NULL, NULL, 0, &count), CBVH_STOPPED, "found the query stopped");
+        CHECK(pthread_join(thread, NULL) == 0);
+        /* New ones, until the flag is cleared. */
+        FAILS(cbvh_collide(querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "clear its flag");
+        FAILS(cbvh_tracker_collide(tracker, querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "");
+        FAILS(cbvh_scene_collide(many, &answer), CBVH_STOPPED, "");
+        OK(cbvh_stop_clear(stop));
+        CHECK(pthread_create(&thread, NULL, set_soon, NULL) == 0);
+        FAILS(cbvh_scene_contacts(many, NULL, 0, &count), CBVH_STOPPED, "");
+        CHECK(pthread_join(thread, NULL) == 0);
+        OK(cbvh_stop_clear(stop));
+        cbvh_distance_answer answers[POSES];
+        OK(cbvh_distances(querier, mesh, mesh, poses, POSES, NULL, answers));
+        CHECK(memcmp(answers, expected, sizeof expected) == 0);
+    }
+    CHECK(cbvh_contacts(querier, fan, fan, &here, 1, NULL, NULL, 0, &count) == CBVH_BUFFER_TOO_SMALL);
+    CHECK(count == (size_t)TRIANGLES * TRIANGLES);
+    /* Without a flag, or with one whose handle is gone. */
+    OK(cbvh_stop_set(stop));
+    OK(cbvh_scene_set_stop(many, no_stop));
+    OK(cbvh_scene_collide(many, &answer));
+    CHECK(answer);
+    OK(cbvh_stop_free(stop));
+    FAILS(cbvh_stop_clear(stop), CBVH_INVALID_HANDLE, "found one of a stop that was freed");
+    FAILS(cbvh_collide(querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "");
+    OK(cbvh_querier_set_stop(querier, no_stop));
+    OK(cbvh_collide(querier, mesh, mesh, poses, 1, &answer));
+    OK(cbvh_scene_free(many));
+    OK(cbvh_tracker_free(tracker));
+    OK(cbvh_querier_free(querier));
+    OK(cbvh_mesh_free(fan));
+}
+
 int main(void) {
     /* More threads than cores, so that some wait for others. */
     CHECK(setenv("RAYON_NUM_THREADS", "8", 1) == 0);
@@ -257,6 +339,7 @@ int main(void) {
     callbacks_that_ask();
     lookers();
     swaps();
+    stops();
 
     CHECK(pthread_barrier_init(&barrier, NULL, 2) == 0);
     OK(cbvh_path_from_functions(waiting_pose, no_sagitta, NULL, NULL, &path));

@@ -558,6 +558,36 @@ void robots(const std::string &urdf) {
 
 } // namespace
 
+/// A flag stops questions of all who have it, until it is cleared.
+static void stops(const std::string &urdf) {
+    const cbvh::Mesh mesh = cube(1);
+    cbvh::Querier querier;
+    cbvh::Scene scene;
+    cbvh::Robot robot = cbvh::Robot::from_urdf(urdf);
+    const std::vector<double> up(robot.joints().size());
+    scene.add(mesh, {});
+    scene.add(mesh, {});
+    const cbvh::Stop stop;
+    querier.set_stop(stop);
+    scene.set_stop(stop);
+    robot.set_stop(stop);
+    CHECK(querier.collide(mesh, mesh, cbvh::Pose()) && scene.collide());
+    const bool touches = robot.collide(up);
+    std::thread([&] { stop.set(); }).join();
+    FAILS(querier.collide(mesh, mesh, cbvh::Pose()), CBVH_STOPPED, "found the query stopped");
+    FAILS(scene.collide(), CBVH_STOPPED, "");
+    FAILS(cbvh::Scene(scene).collide(), CBVH_STOPPED, "");
+    FAILS(robot.collide(up), CBVH_STOPPED, "");
+    querier.set_stop(nullptr);
+    CHECK(querier.collide(mesh, mesh, cbvh::Pose()));
+    stop.clear();
+    CHECK(scene.collide() && robot.collide(up) == touches);
+    stop.set();
+    scene.set_stop(nullptr);
+    robot.set_stop(nullptr);
+    CHECK(scene.collide() && robot.collide(up) == touches);
+}
+
 /// The warnings of bakes and of robots: all of them, and none.
 static void warnings() {
     const std::filesystem::path folder = std::filesystem::temp_directory_path() / "cbvh-wrapper";
@@ -592,6 +622,7 @@ int main(int count, char **arguments) {
     scenes();
     shapes();
     robots(std::string(arguments[1]) + "/robot/robot.urdf");
+    stops(std::string(arguments[1]) + "/robot/robot.urdf");
     warnings();
     // A thread of its own has messages of its own.
     std::thread([] { FAILS(cbvh::Mesh::open(""), CBVH_SYSTEM, ""); }).join();

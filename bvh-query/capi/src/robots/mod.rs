@@ -13,10 +13,11 @@ use crate::output::{List, One};
 use crate::poses;
 use crate::shared::{Shared, Snapshot};
 use crate::status::{Failure, Status};
+use crate::stops;
 use crate::table::{Kind, Table};
 use crate::types::{
     BASE_FIXED, BASE_FLOATING, BASE_PLANAR, Body, BodyPairRow, FrequentPairRow, JointValueRow, LimitsRow,
-    MeshHandle, PoseRows, RobotChoices, RobotCounts, RobotHandle,
+    MeshHandle, PoseRows, RobotChoices, RobotCounts, RobotHandle, StopHandle,
 };
 use bvh_query::OwnedShape;
 use cbvh_robot::{Base, Geometry, Robot, RobotOptions, UpAxis};
@@ -156,6 +157,7 @@ about! {
         let pairs = robot.pairs();
         pairs.iter().map(|pair| numbered(robot, pair)).collect::<Vec<_>>()
     };
+    change cbvh_robot_set_stop(stop: StopHandle,) = robot.set_stop(stops::of(stop)?);
     one cbvh_robot_find(name: *const c_char,) -> body: Body = Body::of(robot.body(text("name", name)?)?);
 }
 

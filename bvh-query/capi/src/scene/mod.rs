@@ -12,8 +12,9 @@ use crate::output::One;
 use crate::poses;
 use crate::shared::{Shared, Snapshot};
 use crate::status::{Failure, Status};
+use crate::stops;
 use crate::table::{Kind, Table};
-use crate::types::{self, Instance, MeshHandle, PoseRows, SceneHandle, StatsRow};
+use crate::types::{self, Instance, MeshHandle, PoseRows, SceneHandle, StatsRow, StopHandle};
 use bvh_query::{Bvh, Groups, InstanceId, QueryStats, Scene, SceneShape};
 use std::ffi::c_char;
 
@@ -117,6 +118,7 @@ about! {
     scene: SceneHandle, see;
     change cbvh_scene_set_tracking(tracking: i32,) = scene.set_tracking(flag("tracking", tracking)?);
     change cbvh_scene_set_budget(visits: u64,) = scene.set_budget(visits);
+    change cbvh_scene_set_stop(stop: StopHandle,) = scene.set_stop(stops::of(stop)?);
     change cbvh_scene_remove(instance: Instance,) = {
         let held = held(scene, instance)?;
         scene.remove(instance.into())?;
