@@ -5,13 +5,15 @@
 
 use crate::arguments::reserved;
 use crate::errors::backend_error;
-use bvh_query::Querier;
+use crate::stops::{Elsewhere, PATIENCE, of_this_thread, watched};
 use bvh_query::floats::with_default_floats;
+use bvh_query::{Querier, Stop};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 /// Queriers that are not in use. Their memory is that of the largest questions so far. To move one takes longer than a short
 /// question, so they stay where they are.
@@ -22,7 +24,11 @@ fn with_querier<T>(ask: impl FnOnce(&mut Querier) -> PyResult<T>) -> PyResult<T>
     let kept = QUERIERS.lock().ok().and_then(|mut queriers| queriers.pop());
     let mut querier = match kept {
         Some(querier) => querier,
-        None => Box::new(Querier::new().map_err(backend_error)?),
+        None => {
+            let mut made = Box::new(Querier::new().map_err(backend_error)?);
+            made.set_stop(Some(of_this_thread()));
+            made
+        }
     };
     let answer = ask(&mut querier);
     // After an error, which is rare, a querier may be in the middle of a question.
@@ -34,18 +40,25 @@ fn with_querier<T>(ask: impl FnOnce(&mut Querier) -> PyResult<T>) -> PyResult<T>
     answer
 }
 
+/// Locks a mutex. A panic elsewhere leaves what these guard whole.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Works without Python's lock, and in the default state of floating-point arithmetic: a library that is loaded into
 /// Python may have changed that of its threads.
 pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> T {
     py.detach(|| with_default_floats(|_| work()))
 }
 
+/// Asks without Python's lock, as `detached` does. An exception that a handler of a signal raises ends the question.
+pub(crate) fn asked<T: Send>(py: Python<'_>, ask: impl FnOnce() -> PyResult<T> + Send) -> PyResult<T> {
+    detached(py, || watched(ask))
+}
+
 /// How many questions are asked before the time is looked at.
 const QUESTIONS: usize = 64;
 const QUESTIONS_ON_ALL_CORES: usize = 1024;
-
-/// How long questions may run before Python handles signals, such as that of Ctrl-C.
-const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Asks about all items, one after the other.
 pub(crate) fn one_by_one<P: Sync, T: Send>(
@@ -53,27 +66,36 @@ pub(crate) fn one_by_one<P: Sync, T: Send>(
     items: &[P],
     ask: impl Fn(&mut Querier, &P) -> PyResult<T> + Sync,
 ) -> PyResult<Vec<T>> {
-    detached(py, || {
+    asked(py, || {
         with_querier(|querier| {
             in_turns(items, QUESTIONS, |items| items.iter().map(|item| ask(querier, item)).collect())
         })
     })
 }
 
-/// Asks about all items by questions about many, which use all cores.
+/// Asks about all items by questions about many, which use all cores. `ask` gets what stops them.
 pub(crate) fn on_all_cores<P: Sync, T: Send>(
     py: Python<'_>,
     items: &[P],
-    ask: impl Fn(&[P]) -> PyResult<Vec<T>> + Sync,
+    ask: impl Fn(Arc<dyn Stop>, &[P]) -> PyResult<Vec<T>> + Sync,
 ) -> PyResult<Vec<T>> {
-    detached(py, || in_turns(items, QUESTIONS_ON_ALL_CORES, |items| on_pool(|| ask(items))?))
+    asked(py, || in_turns(items, QUESTIONS_ON_ALL_CORES, |items| on_pool(|stop| ask(stop, items))?))
 }
 
 /// The pool of a process.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Runs something that uses all cores, or as many as the environment variable `RAYON_NUM_THREADS` says.
-pub(crate) fn on_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+/// Asks on all cores or on this thread, with what stops the question.
+pub(crate) fn on_threads<T: Send>(
+    parallel: bool,
+    ask: impl FnOnce(Arc<dyn Stop>) -> T + Send,
+) -> PyResult<T> {
+    if parallel { on_pool(ask) } else { Ok(ask(of_this_thread())) }
+}
+
+/// Runs something that uses all cores, or as many as the environment variable `RAYON_NUM_THREADS` says. While this thread waits for it,
+/// Python handles signals.
+pub(crate) fn on_pool<T: Send>(work: impl FnOnce(Arc<dyn Stop>) -> T + Send) -> PyResult<T> {
     let own = std::process::id();
     let pool = {
         let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
@@ -89,7 +111,33 @@ pub(crate) fn on_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
             }
         }
     };
-    Ok(pool.install(work))
+    let (elsewhere, done, is_done) = (Elsewhere::new(), Mutex::new(None), Condvar::new());
+    let stop = elsewhere.stop();
+    let mut raised = None;
+    pool.in_place_scope(|scope| {
+        scope.spawn(|_| {
+            let found = catch_unwind(AssertUnwindSafe(|| work(stop)));
+            *locked(&done) = Some(found);
+            is_done.notify_one();
+        });
+        let mut found = locked(&done);
+        while found.is_none() {
+            found = is_done.wait_timeout(found, PATIENCE).unwrap_or_else(PoisonError::into_inner).0;
+            if found.is_none() && raised.is_none() {
+                // Handlers may run for as long as they like.
+                drop(found);
+                raised = elsewhere.handle_signals().err();
+                found = locked(&done);
+            }
+        }
+    });
+    let found = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match (raised, found) {
+        (Some(raised), _) => Err(raised),
+        (None, Some(Ok(found))) => Ok(found),
+        (None, Some(Err(panic))) => resume_unwind(panic),
+        (None, None) => unreachable!("this thread has waited for it"),
+    }
 }
 
 /// Asks about so many items at a time, and lets Python handle signals in between.

@@ -3,13 +3,19 @@
 use bvh_bake::ReadError;
 use bvh_query::{BackendError, OpenError, QueryError};
 use pyo3::create_exception;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::fmt::Display;
 use std::path::Path;
 
 create_exception!(cbvh, FormatError, PyValueError, "A file is not a valid .cbvh file, or is damaged.");
 create_exception!(cbvh, BakeError, PyValueError, "A mesh cannot be baked.");
+create_exception!(
+    cbvh,
+    StoppedError,
+    PyRuntimeError,
+    "A question was stopped before it had an answer: see Stop."
+);
 
 /// The exception of a file that cannot be opened. An error of the system keeps its class, such as `FileNotFoundError`.
 pub(crate) fn open_error(error: OpenError) -> PyErr {
@@ -43,6 +49,9 @@ pub(crate) fn question_error(error: &QueryError, message: String) -> PyErr {
     match error {
         QueryError::Damaged(_) => FormatError::new_err(message),
         QueryError::File { .. } => PyOSError::new_err(message),
+        QueryError::Stopped => {
+            StoppedError::new_err("expected time for an answer, found the question stopped")
+        }
         _ => PyValueError::new_err(message),
     }
 }

@@ -18,6 +18,7 @@ mod robot;
 mod scene;
 mod scene_pairs;
 mod shapes;
+mod stops;
 mod view;
 
 use pyo3::prelude::*;
@@ -29,6 +30,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<paths::Paths>()?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<scene::Scene>()?;
+    module.add_class::<stops::Flag>()?;
     module.add_class::<view::Page>()?;
     macro_rules! functions {
         ($($function:path),*) => { $(module.add_function(wrap_pyfunction!($function, module)?)?;)* };
@@ -77,6 +79,7 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         scene_pairs::scene_is_free
     ];
     module.add("FormatError", module.py().get_type::<errors::FormatError>())?;
+    module.add("StoppedError", module.py().get_type::<errors::StoppedError>())?;
     module.add("BakeError", module.py().get_type::<errors::BakeError>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -22,7 +22,11 @@ fn ask<T: Send>(
     // Without paths, too, the other arguments are checked.
     if paths.is_empty() || parallel && !paths.iter().any(AnyPath::is_called) {
         let all = Batch::new(a, b).map_err(backend_error)?;
-        return on_all_cores(py, paths, |paths| batch(&all, paths).map_err(query_error));
+        return on_all_cores(py, paths, |stop, paths| {
+            let mut all = all.clone();
+            all.set_stop(Some(stop));
+            batch(&all, paths).map_err(query_error)
+        });
     }
     one_by_one(py, paths, |querier, path| {
         until_raised([path].into_iter(), || one(querier, path))?.map_err(query_error)

@@ -43,7 +43,11 @@ impl<'py, 'a> Question<'py, 'a> {
         // Without poses, too, the other arguments are checked.
         if self.parallel || poses.is_empty() {
             let all = Batch::new(a, b).map_err(backend_error)?;
-            return on_all_cores(self.py, poses, |poses| batch(&all, poses).map_err(query_error));
+            return on_all_cores(self.py, poses, |stop, poses| {
+                let mut all = all.clone();
+                all.set_stop(Some(stop));
+                batch(&all, poses).map_err(query_error)
+            });
         }
         one_by_one(self.py, poses, |querier, pose| one(querier, [a, b], pose).map_err(query_error))
     }

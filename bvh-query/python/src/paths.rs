@@ -2,7 +2,7 @@
 
 use crate::answers::Answers;
 use crate::arguments::{many_poses, number, numbers, pose, poses, shape_error, vector};
-use crate::asking::detached;
+use crate::asking::{detached, locked};
 use crate::errors::value_error;
 use bvh_query::floats::with_default_floats;
 use bvh_query::{Motion, Polyline, Pose, RigidPath};
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use std::cell::Cell;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// A path of the library.
 #[derive(Clone)]
@@ -231,11 +231,6 @@ impl Called {
         // Unlike a panic, this prints nothing.
         resume_unwind(Box::new(Raised))
     }
-}
-
-/// Locks a mutex. A panic elsewhere leaves what these guard whole.
-pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl RigidPath for Called {

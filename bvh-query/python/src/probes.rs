@@ -72,7 +72,11 @@ impl<'py, P: Sync> Question<'py, P> {
         // Without probes, too, the other arguments are checked.
         let found = if self.parallel || probes.is_empty() {
             let all = ProbeBatch::new(placed).map_err(backend_error)?;
-            on_all_cores(self.py, probes, |probes| batch(&all, probes).map_err(query_error))
+            on_all_cores(self.py, probes, |stop, probes| {
+                let mut all = all.clone();
+                all.set_stop(Some(stop));
+                batch(&all, probes).map_err(query_error)
+            })
         } else {
             one_by_one(self.py, probes, |querier, probe| one(querier, placed, probe).map_err(query_error))
         };

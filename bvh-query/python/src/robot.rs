@@ -2,11 +2,11 @@
 
 use crate::answers::{Answers, array, matrix, signed_distances};
 use crate::arguments::{number, pose_or_identity};
-use crate::asking::{detached, in_turns, on_pool};
+use crate::asking::{asked, detached, in_turns, locked, on_pool, on_threads};
 use crate::errors::{backend_error, bake_error, open_error, query_error, question_error, system_error};
 use crate::mesh::Mesh;
 use crate::pairs::depth_options;
-use crate::paths::locked;
+use crate::stops::of_this_thread;
 use bvh_query::{MotionOptions, NumberError, OwnedShape, Pose};
 use cbvh_robot::{
     Base, Edge, Geometry, NearPair, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions,
@@ -132,17 +132,21 @@ impl Robot {
         one: impl Fn(&mut cbvh_robot::Robot, &[f64]) -> Result<T, RobotError> + Sync,
         many: impl Fn(&mut cbvh_robot::Robot, &[f64]) -> Result<Vec<T>, RobotError> + Sync,
     ) -> PyResult<Vec<T>> {
-        detached(py, || {
+        asked(py, || {
             self.ask(|robot| {
                 for (row, joints) in rows.iter().enumerate().filter(|_| rows.len() > 1) {
                     robot.check(joints).map_err(|source| robot_error(in_row(row, source)))?;
                 }
                 let parallel = parallel && rows.iter().all(|row| !row.is_empty());
                 in_turns(rows, if parallel { 8192 } else { 64 }, |rows| {
-                    if parallel {
-                        return on_pool(|| many(robot, &rows.concat()))?.map_err(robot_error);
-                    }
-                    rows.iter().map(|row| one(robot, row).map_err(robot_error)).collect()
+                    let found = on_threads(parallel, |stop| {
+                        robot.set_stop(Some(stop));
+                        if parallel {
+                            return many(robot, &rows.concat());
+                        }
+                        rows.iter().map(|row| one(robot, row)).collect()
+                    });
+                    found?.map_err(robot_error)
                 })
             })
         })
@@ -201,7 +205,7 @@ impl Robot {
         options.cylinder_error = cylinder_error;
         options.allow_outside = allow_outside;
         options.up_axis = if apply_up_axis { UpAxis::Turned } else { UpAxis::Kept };
-        let robot = detached(py, || on_pool(|| cbvh_robot::Robot::from_urdf(path, &options)))?;
+        let robot = detached(py, || on_pool(|_| cbvh_robot::Robot::from_urdf(path, &options)))?;
         Ok(Self::of(robot.map_err(robot_error)?, HashMap::new()))
     }
 
@@ -344,8 +348,20 @@ impl Robot {
         samples: usize,
         share: f64,
     ) -> PyResult<Vec<([String; 2], f64)>> {
-        detached(py, || on_pool(|| locked(&self.0).robot.allow_frequent(samples, share)))?
-            .map_err(robot_error)
+        asked(py, || {
+            let frequent = self.ask(|robot| {
+                let found = on_pool(|stop| {
+                    robot.set_stop(Some(stop));
+                    robot.allow_frequent(samples, share)
+                });
+                found?.map_err(robot_error)
+            })?;
+            let robot = &mut locked(&self.0).robot;
+            for ([a, b], _) in &frequent {
+                robot.allow(a, b).map_err(robot_error)?;
+            }
+            Ok(frequent)
+        })
     }
 
     fn add_obstacle(
@@ -586,17 +602,20 @@ impl Robot {
         parallel: bool,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let (edges, options) = (edges(&from, &to)?, options(clearance, tolerance));
-        let free = detached(py, || {
+        let free = asked(py, || {
             self.ask(|robot| {
                 for (row, edge) in edges.iter().enumerate().filter(|_| edges.len() > 1) {
                     robot.check_edge(edge).map_err(|source| robot_error(in_row(row, source)))?;
                 }
                 in_turns(&edges, if parallel { 256 } else { 1 }, |edges| {
-                    if parallel {
-                        return on_pool(|| robot.are_free(edges, &options))?.map_err(robot_error);
-                    }
-                    let of = |edge| robot.is_edge_free(edge, &options).map_err(robot_error);
-                    edges.iter().map(of).collect()
+                    let found = on_threads(parallel, |stop| {
+                        robot.set_stop(Some(stop));
+                        if parallel {
+                            return robot.are_free(edges, &options);
+                        }
+                        edges.iter().map(|edge| robot.is_edge_free(edge, &options)).collect()
+                    });
+                    found?.map_err(robot_error)
                 })
             })
         })?;
@@ -613,7 +632,12 @@ impl Robot {
     ) -> PyResult<Motion> {
         let edge = Edge::polynomials(rows(&coefficients)?);
         let options = options(clearance, tolerance);
-        let found = detached(py, || self.ask(|robot| robot.motion(&edge, &options).map_err(robot_error)))?;
+        let found = asked(py, || {
+            self.ask(|robot| {
+                robot.set_stop(Some(of_this_thread()));
+                robot.motion(&edge, &options).map_err(robot_error)
+            })
+        })?;
         Ok(match found {
             RobotMotion::Hit { free_until, touching_at, joints, bodies, nearest, .. } => {
                 (1, free_until, touching_at, joints, bodies, nearest.distance)

@@ -6,10 +6,9 @@
 
 use crate::answers::{Answers, array, table};
 use crate::arguments::{self, pose_or_identity};
-use crate::asking::{detached, on_pool};
+use crate::asking::{asked, detached, locked, on_threads};
 use crate::errors::{FormatError, backend_error, open_error, query_error, question_error, value_error};
 use crate::mesh::Mesh;
-use crate::paths::locked;
 use bvh_query::{
     Bvh, Groups, InstanceId, InstanceLabel, OwnedShape, Pose, SceneError, ScenePair, SceneShape,
 };
@@ -176,7 +175,7 @@ impl Scene {
         py: Python<'_>,
         work: impl FnOnce(&mut State) -> PyResult<T> + Send,
     ) -> PyResult<T> {
-        detached(py, || {
+        asked(py, || {
             let (mut own, empty) = {
                 let Shared { state, idle, empty } = &mut *locked(&self.0);
                 let snapshot = state.scene.snapshot();
@@ -203,8 +202,10 @@ impl Scene {
         read: impl FnOnce(&State, A) -> T + Send,
     ) -> PyResult<T> {
         self.with_snapshot(py, |state| {
-            let answer =
-                if state.parallel { on_pool(|| ask(&mut state.scene))? } else { ask(&mut state.scene) };
+            let answer = on_threads(state.parallel, |stop| {
+                state.scene.set_stop(Some(stop));
+                ask(&mut state.scene)
+            })?;
             match answer {
                 Ok(answer) => Ok(read(state, answer)),
                 Err(error) => Err(state.refused(error)),

@@ -2,7 +2,7 @@
 
 use crate::answers::{self, Answers, FREE, HIT, NEAR, array, table};
 use crate::arguments::number;
-use crate::asking::on_pool;
+use crate::asking::on_threads;
 use crate::motions::options;
 use crate::pairs::{ClashLimits, depth_options};
 use crate::paths::{AnyPath, until_raised};
@@ -171,11 +171,10 @@ impl Ways {
             let parallel = state.parallel && !self.paths.iter().any(AnyPath::is_called);
             let scene = &mut state.scene;
             scene.set_parallel(parallel);
-            let answer = if parallel {
-                on_pool(|| ask(scene, &ways))?
-            } else {
-                until_raised(self.paths.iter(), || ask(scene, &ways))?
-            };
+            let answer = on_threads(parallel, |stop| {
+                scene.set_stop(Some(stop));
+                until_raised(self.paths.iter(), || ask(scene, &ways))
+            })??;
             match answer {
                 Ok(answer) => Ok(read(state, answer)),
                 Err(error) => Err(state.refused(error)),

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 fn baked(py: Python<'_>, core: Result<Triangles, ShapeError>) -> PyResult<Mesh> {
     let core = core.map_err(|error| PyValueError::new_err(error.to_string()))?;
     let (bytes, _) =
-        detached(py, || on_pool(|| to_bytes(&core, &Options::default())))?.map_err(bake_error)?;
+        detached(py, || on_pool(|_| to_bytes(&core, &Options::default())))?.map_err(bake_error)?;
     let opened = Bvh::from_bytes(bytes);
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
 }

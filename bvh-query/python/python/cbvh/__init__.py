@@ -48,9 +48,12 @@ about a `Scene` as it is when the question begins, and a path of your own is cal
 are copied before a question runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
 enables the lock when it imports this module.
 
+**Stopping.** In the block of a `Stop`, questions end when another thread sets its flag, or after a time. Ctrl-C ends questions of the main
+thread, within about a tenth of a second.
+
 Errors are exceptions: ``ValueError`` for invalid arguments, ``TypeError`` for arguments of a wrong type, ``KeyError``
 for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError`` for files that
-are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked.
+are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked, ``StoppedError`` for questions that a `Stop` ends.
 """
 
 from ._answers import (
@@ -88,13 +91,14 @@ from ._answers import (
     SignedDistance,
 )
 from ._baking import BakeWarning, bake, bake_files
-from ._cbvh import BakeError, FormatError, __version__
+from ._cbvh import BakeError, FormatError, StoppedError, __version__
 from ._mesh import Mesh, _unpickle, open
 from ._motion import Motion, Path, Polyline
 from ._poses import nearest_pose, pose, relative
 from ._robot import InsideWarning, NearPair, NearPairs, Robot, RobotDistance, RobotMotion, RobotSignedDistance, _robot_of
 from ._scene import Scene, _scene_of
 from ._shapes import box, capsule, cloud, cone, convex_hull, cylinder, ground, height_field, octree, sphere, voxels
+from ._stopping import Stop
 from ._view import View
 from .manager import CollisionManager
 
@@ -147,6 +151,8 @@ __all__ = [
     "Separation",
     "Side",
     "SignedDistance",
+    "Stop",
+    "StoppedError",
     "View",
     "bake",
     "bake_files",

@@ -28,12 +28,14 @@ __version__: str
 __all__ = [
     "__version__",
     "BakeError",
+    "Flag",
     "FormatError",
     "Mesh",
     "Page",
     "Paths",
     "Robot",
     "Scene",
+    "StoppedError",
     "all_hits",
     "any_hits",
     "bake",
@@ -91,6 +93,15 @@ __all__ = [
 
 class FormatError(ValueError): ...
 class BakeError(ValueError): ...
+class StoppedError(RuntimeError): ...
+
+@final
+class Flag:
+    def __new__(cls, after: float | None) -> Flag: ...
+    def set(self, is_set: bool) -> None: ...
+    def is_set(self) -> bool: ...
+    def enter(self) -> None: ...
+    def leave(self) -> None: ...
 
 @final
 class Mesh:
