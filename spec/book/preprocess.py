@@ -1,4 +1,5 @@
-"""Prepares the chapters for mdBook: includes documents of the repository as a whole, and leads their links to where they are in the book.
+"""Prepares the chapters for mdBook: includes documents of the repository as a whole, leads their links to where they are in the book, and
+writes the references of languages.
 
 A link to a document that a chapter includes becomes a link to that chapter. A link to another file of the repository begins with the
 address of the repository, if book.toml states one (`[preprocessor.repository] address`). If a folder of the book is stated (`files`, as
@@ -13,6 +14,7 @@ import re
 import sys
 
 import pages
+import references
 import site_files
 
 
@@ -76,8 +78,8 @@ def main() -> None:
                 text = document.read_text(encoding="utf-8")
                 return led(text, document.parent, chapter, places, address, output, files)
 
-            text = led(item["Chapter"]["content"], chapter.parent, chapter, places, address, output, files)
-            item["Chapter"]["content"] = pages.INCLUDE.sub(whole, text)
+            own = led(item["Chapter"]["content"], chapter.parent, chapter, places, address, output, files)
+            item["Chapter"]["content"] = references.replaced(pages.INCLUDE.sub(whole, own))
             prepare(item["Chapter"]["sub_items"])
 
     prepare(book["items"] if "items" in book else book["sections"])

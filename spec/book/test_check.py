@@ -1,12 +1,17 @@
 """Tests how documents are read, and that the checks find what they are for."""
 
+import io
+import json
 import pathlib
 import re
+import sys
 import unittest
+import unittest.mock
 
 import check
 import pages
 import preprocess
+import references
 
 PAGE = """# A page, with `code` and a [link](there.md#part)
 
@@ -101,6 +106,68 @@ class Documents(unittest.TestCase):
         for term, page in terms:
             with self.subTest(term=term, page=page):
                 self.assertIn(term.lower(), texts[page])
+
+
+class References(unittest.TestCase):
+    """The pages that are made from sources."""
+
+    pages = {language: made() for language, made in references.references.items()}
+    # Less than there are now: a source that is read otherwise than it is written has fewer.
+    least = {"python": (60, 150), "c": (230, 150), "typescript": (70, 150)}
+
+    def test_everything_public_is_there(self):
+        for language, page in self.pages.items():
+            headings = re.findall(r"^##+ (.*)", page, re.M)
+            words = {word for heading in headings for word in re.findall(r"[\w.]+", heading)}
+            names = references.names[language]()
+            self.assertGreaterEqual(len(names), self.least[language][0], language)
+            self.assertGreaterEqual(len(headings), self.least[language][1], language)
+            self.assertEqual([name for name in names if name not in words], [], language)
+            self.assertEqual(len(headings), len(set(headings)), language)
+
+    def test_members_and_their_words_are_there(self):
+        python, c, typescript = self.pages["python"], self.pages["c"], self.pages["typescript"]
+        for expected in ("Mesh.collide(other: Mesh, poses: ArrayLike, ", "### Polyline", "APART = 1", "Robot.joints: list"):
+            self.assertIn(expected, python)
+        self.assertNotIn("_cbvh", re.sub(r"`[^`]*_cbvh`", "", python))
+        for expected in ("CBVH_STOPPED = 12", "typedef double (*cbvh_sagitta_function)", "Writes the `CBVH_ABI` of the library"):
+            self.assertIn(expected, c)
+        for expected in ("#### CbvhWorker.terminate", "#### Scene.pairsInContact", "get triangleCount(): number", "enum Relation {"):
+            self.assertIn(expected, typescript)
+        for hidden in ("#call", "_raw", "@param", "@internal", "{@link"):
+            self.assertNotIn(hidden, typescript)
+
+    def test_every_function_of_c_and_python_has_words(self):
+        for language in ("python", "c"):
+            parts = re.split(r"^##+ (.*)\n", self.pages[language], flags=re.M)
+            for name, part in zip(parts[1::2], parts[2::2]):
+                is_group = name in ("Functions", "Classes", "Exceptions") or re.fullmatch(r"[A-Z][a-z ]+", name)
+                text = re.sub(r"^```.*?^```", "", part, flags=re.M | re.S).strip()
+                self.assertTrue(is_group or text, f"{language}: {name}")
+
+    def test_blocks_are_closed_and_nothing_is_taken_for_html(self):
+        for language, page in self.pages.items():
+            self.assertEqual(len(re.findall(r"^```", page, re.M)) % 2, 0, language)
+            self.assertNotIn("<", pages.prose(page), language)
+
+    def test_declarations_end_where_they_end(self):
+        self.assertEqual(references.until("a(b: { c: number } = {}): Map<A, () => B> { return; }", "{;"), "a(b: { c: number } = {}): Map<A, () => B>")
+        self.assertEqual(references.folded("f", ["x" * 60, "y" * 60], " -> z"), f"f(\n    {'x' * 60},\n    {'y' * 60},\n) -> z")
+        self.assertEqual(references.remark(" * Says.\n * @param a One\n * more.\n * @returns It.\n"), "Says.\n\n- `a`: One\nmore.\n- Returns: It.")
+        self.assertEqual(references.plain("a <b> `<c>`"), "a &lt;b> `<c>`")
+
+    def test_the_book_has_them(self):
+        chapters = [path for path in pages.chapters() if references.DIRECTIVE.search(path.read_text(encoding="utf-8"))]
+        self.assertEqual(len(chapters), len(references.references))
+        context = {"config": {"build": {"build-dir": "../../target/book"}}}
+        of = [{"Chapter": {"path": path.relative_to(pages.SOURCES).as_posix(), "content": path.read_text(), "sub_items": []}} for path in chapters]
+        with unittest.mock.patch.object(sys, "stdin", io.StringIO(json.dumps([context, {"items": of}]))):
+            with unittest.mock.patch.object(sys, "stdout", io.StringIO()) as written, unittest.mock.patch.object(sys, "argv", ["x"]):
+                preprocess.main()
+        made = [item["Chapter"]["content"] for item in json.loads(written.getvalue())["items"]]
+        self.assertEqual([text for text in made if "{{#" in text], [])
+        for page in self.pages.values():
+            self.assertTrue(any(page in text for text in made))
 
 
 if __name__ == "__main__":
