@@ -73,20 +73,20 @@ fn is_stopped() -> bool {
 /// Lets Python handle signals if it is time.
 fn is_interrupted() -> bool {
     let Watch { reads, handled } = WATCH.get();
-    WATCH.set(Watch { reads: reads.wrapping_add(1), handled });
-    if !(reads + 1).is_multiple_of(READS_PER_LOOK) {
-        return RAISED.with_borrow(Option::is_some);
-    }
-    match handled {
-        None => WATCH.set(Watch { reads, handled: Some(Instant::now()) }),
-        Some(since) if since.elapsed() > PATIENCE => {
-            let raised = Python::attach(|py| py.check_signals()).err();
-            WATCH.set(Watch { reads, handled: Some(Instant::now()) });
-            if raised.is_some() {
-                RAISED.replace(raised);
+    let reads = reads.wrapping_add(1);
+    let set = |handled| WATCH.set(Watch { reads, handled });
+    set(handled);
+    if reads.is_multiple_of(READS_PER_LOOK) {
+        match handled {
+            None => set(Some(Instant::now())),
+            Some(since) if since.elapsed() > PATIENCE => {
+                if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                    RAISED.set(Some(raised));
+                }
+                set(Some(Instant::now()));
             }
+            Some(_) => {}
         }
-        Some(_) => {}
     }
     RAISED.with_borrow(Option::is_some)
 }
