@@ -42,7 +42,7 @@ pub enum QueryError {
         visits: u64,
     },
     /// The flag of [`crate::Querier::set_stop`] was set before there was an answer. Nothing is known of it.
-    #[error("expected time for an answer, found the query stopped; clear its flag to query again")]
+    #[error("expected time for an answer, found the query stopped: its flag is set, or its time is over")]
     Stopped,
     /// A number given with the question is invalid, such as a distance of NaN.
     #[error(transparent)]

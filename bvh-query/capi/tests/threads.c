@@ -282,7 +282,7 @@ static void stops(void) {
         FAILS(cbvh_contacts(querier, fan, fan, &here, 1, NULL, NULL, 0, &count), CBVH_STOPPED, "found the query stopped");
         CHECK(pthread_join(thread, NULL) == 0);
         /* New ones, until the flag is cleared. */
-        FAILS(cbvh_collide(querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "clear its flag");
+        FAILS(cbvh_collide(querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "its flag is set");
         FAILS(cbvh_tracker_collide(tracker, querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "");
         FAILS(cbvh_scene_collide(many, &answer), CBVH_STOPPED, "");
         OK(cbvh_stop_clear(stop));

@@ -1,5 +1,6 @@
 //! Copies JavaScript arrays, and refuses those of the wrong length.
 
+use crate::time_limit;
 use bvh_query::{BackendError, Pose, Querier};
 use js_sys::{Float64Array, Uint8Array, Uint32Array};
 use std::cell::Cell;
@@ -104,6 +105,7 @@ thread_local! {
 pub(crate) fn with_querier<T>(ask: impl FnOnce(&mut Querier) -> Answer<T>) -> Answer<T> {
     let known = QUERIER.take().map_or_else(Querier::new, Ok);
     let mut querier = known.map_err(|error: BackendError| refused(error))?;
+    querier.set_stop(time_limit::start());
     let answer = ask(&mut querier);
     QUERIER.set(Some(querier));
     answer

@@ -20,3 +20,4 @@ mod probes;
 mod scene;
 mod scene_questions;
 mod shapes;
+mod time_limit;

@@ -9,14 +9,16 @@ use crate::overlaps::{clash_options, depth_options};
 use crate::paths;
 use crate::probes::{Rays, segments};
 use crate::scene::{Scene, beside};
+use crate::time_limit;
 use bvh_query::{
-    Clash, Contact, Distance, InstanceId, OwnedShape, Pose, RigidPath, SceneError, SceneMotionAnswer,
+    Clash, Contact, Distance, InstanceId, OwnedShape, Pose, Querier, RigidPath, SceneError, SceneMotionAnswer,
 };
 use js_sys::{Array, Float64Array, Int8Array, Int32Array, Uint8Array, Uint32Array};
 use wasm_bindgen::prelude::*;
 
 impl Scene {
     fn ask<T>(&mut self, ask: impl FnOnce(&mut bvh_query::Scene) -> Result<T, SceneError>) -> Answer<T> {
+        self.scene.set_stop(time_limit::start());
         ask(&mut self.scene).map_err(|error| self.refused(error))
     }
 
@@ -115,7 +117,7 @@ impl Scene {
                 format_args!("expected two instances for each, found {found} in all"),
             ));
         }
-        let distance = |&[a, b]: &[u32; 2]| {
+        let distance = |querier: &mut Querier, &[a, b]: &[u32; 2]| {
             // The margin of the pair goes to A.
             let margins = [self.margin(a)? + self.pair_margin(a, b)?, self.margin(b)?];
             let ((pose_a, a), (pose_b, b)) = (self.placed(a, "pairs")?, self.placed(b, "pairs")?);
@@ -125,9 +127,12 @@ impl Scene {
             };
             let (a, b) = (grown(a, margins[0])?, grown(b, margins[1])?);
             let pose = Pose::relative(&pose_a, &pose_b).map_err(refused)?;
-            with_querier(|querier| querier.distance(&a, &b, &pose).map(Some).map_err(refused))
+            querier.distance(&a, &b, &pose).map(Some).map_err(refused)
         };
-        Ok(distances(&pairs.iter().map(distance).collect::<Answer<Vec<Option<Distance>>>>()?))
+        let all = |querier: &mut Querier| {
+            pairs.iter().map(|pair| distance(querier, pair)).collect::<Answer<Vec<Option<Distance>>>>()
+        };
+        Ok(distances(&with_querier(all)?))
     }
 
     /// Kind, time until which the paths are free, time of the contact or of the first undecided poses, the pair and its

@@ -1020,4 +1020,51 @@ export const cases = {
             ok(grown < 200 * bytes.length, `room for some of ${600 * bytes.length} bytes, found ${grown} more`);
         }
     },
+
+    "a time limit ends calls that take longer"(cbvh) {
+        // Triangles that all contain a point, each beside the others: of two such meshes, all pairs touch.
+        const fan = (count) =>
+            cbvh.Mesh.bake(Array.from({ length: count }, (_, k) => [0, 0, 0, 1, 0, 0, k, 1, 0]).flat());
+        const [large, small, here] = [fan(3000), fan(100), at(0, 0, 0)];
+        const scenes = [large, small].map((mesh) => {
+            const scene = new cbvh.Scene();
+            scene.add(mesh);
+            scene.add(mesh);
+            return scene;
+        });
+        const stopped = (work) => {
+            const began = performance.now();
+            const message = refused(work);
+            ok(message.includes("found the query stopped"), `a call that was stopped, found ${message}`);
+            const took = performance.now() - began;
+            ok(took < 1500, `the end of a call, found it after ${took} ms`);
+        };
+        const short = [
+            () => small.collide(small, here),
+            () => small.distance(small, here),
+            () => small.isFree(small, cbvh.Motion.between(here, at(9, 0, 0))),
+            () => small.closestPoints([0, 0, 5]).distance,
+            () => small.selfContacts().triangles,
+            () => scenes[1].pairsInContact(),
+            () => scenes[1].distances([0, 1]).distance,
+        ];
+        const expected = short.map((work) => work());
+        try {
+            cbvh.setTimeLimit(30);
+            stopped(() => large.contacts(large, here));
+            stopped(() => large.contactsEach(large, [here, here, here].flat()));
+            stopped(() => scenes[0].contacts());
+            cbvh.setTimeLimit(0);
+            short.forEach(stopped);
+            cbvh.setTimeLimit(60000);
+            short.forEach((work, place) => equal(work(), expected[place], String(work)));
+            for (const wrong of [-1, Number.NaN, "1"]) {
+                ok(refused(() => cbvh.setTimeLimit(wrong)).startsWith("milliseconds: expected"), "the argument");
+            }
+        } finally {
+            cbvh.setTimeLimit();
+        }
+        short.forEach((work, place) => equal(work(), expected[place], String(work)));
+        equal(small.contacts(small, here).length, 4 * 100 * 100, "all contacts");
+    },
 };

@@ -43,6 +43,11 @@ const cases = {
         }
         equal(await worker.pose([1, 2, 3], [0, 0, 0, 1]), cbvh.pose([1, 2, 3], [0, 0, 0, 1]));
         ok((await worker.memoryBytes()) > 0, "a memory");
+        await worker.setTimeLimit(0);
+        const { message } = await rejected(pairs[0][1].collide(pairs[1][1], at(0)));
+        ok(message.includes("found the query stopped"), `a query that was stopped, found ${message}`);
+        await worker.setTimeLimit();
+        equal(await pairs[0][1].collide(pairs[1][1], at(0)), pairs[0][0].collide(pairs[1][0], at(0)), "without a limit");
 
         const [scene, remote] = [new cbvh.Scene(), await worker.Scene.make()];
         for (const [number, [mesh, held]] of pairs.entries()) {

@@ -50,7 +50,7 @@ export type {
 } from "./mesh.js";
 export { Mesh } from "./mesh.js";
 export type { ModuleSource } from "./module.js";
-export { init, initSync, memoryBytes } from "./module.js";
+export { init, initSync, memoryBytes, setTimeLimit } from "./module.js";
 export { Motion } from "./motion.js";
 export { IDENTITY, nearestPose, pose, relative } from "./poses.js";
 export type {

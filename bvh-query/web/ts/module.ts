@@ -1,5 +1,6 @@
 /** Loads the WebAssembly module, and guards every call of it. */
 
+import { float } from "./arguments.js";
 import start, * as raw from "./raw/cbvh.js";
 
 export { raw };
@@ -98,6 +99,17 @@ export function call<T>(work: () => T): T {
 /** The number of bytes that the module's memory has at present, 0 before it is loaded. It grows, and never shrinks. */
 export function memoryBytes(): number {
     return memory?.buffer.byteLength ?? 0;
+}
+
+/**
+ * Limits the time of each call from now on, in this page or worker. The queries of a call that takes longer end, within a millisecond
+ * or so, with an error that says that they were stopped. Bakes, `Mesh.openEdges` and `Mesh.validate` have no limit.
+ *
+ * @param milliseconds The most that a call may take, also one about N poses; by default there is no limit.
+ */
+export function setTimeLimit(milliseconds: number = Number.POSITIVE_INFINITY): void {
+    const limit = float(milliseconds, "milliseconds");
+    call(() => raw.setTimeLimit(limit));
 }
 
 /** The base class of objects that own something in the module's memory. */

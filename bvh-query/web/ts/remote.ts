@@ -6,7 +6,7 @@
  */
 
 import { Mesh } from "./mesh.js";
-import type { ModuleSource } from "./module.js";
+import type { ModuleSource, setTimeLimit } from "./module.js";
 import { Motion } from "./motion.js";
 import type { nearestPose, pose, relative } from "./poses.js";
 import { Scene } from "./scene.js";
@@ -45,6 +45,7 @@ export type RemoteFunctions = AllLater<
         pose: typeof pose;
         relative: typeof relative;
         memoryBytes: () => number;
+        setTimeLimit: typeof setTimeLimit;
     }
 >;
 
@@ -73,7 +74,7 @@ export interface Held {
 
 const classes = { Mesh, Scene, Motion };
 const functions = ["box", "capsule", "cloud", "cone", "cylinder", "ground", "heightField", "sphere"];
-functions.push("memoryBytes", "nearestPose", "pose", "relative");
+functions.push("memoryBytes", "nearestPose", "pose", "relative", "setTimeLimit");
 
 /** Tells a worker to free what the page no longer has. */
 const unused = new FinalizationRegistry<() => void>((free) => free());

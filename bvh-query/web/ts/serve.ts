@@ -1,7 +1,7 @@
 /** The end of a `CbvhWorker` in the worker: holds meshes, scenes and motions by number, and calls what messages name. */
 
 import { Mesh } from "./mesh.js";
-import { init, memoryBytes, type ModuleSource } from "./module.js";
+import { init, memoryBytes, type ModuleSource, setTimeLimit } from "./module.js";
 import { Motion } from "./motion.js";
 import { nearestPose, pose, relative } from "./poses.js";
 import type { Answer, Held, Port, Question } from "./remote.js";
@@ -25,6 +25,7 @@ const known: Record<string, unknown> = {
     nearestPose,
     pose,
     relative,
+    setTimeLimit,
 };
 
 /** The buffers of an answer, which are copies that nothing else here has. */
