@@ -60,6 +60,7 @@ fn a_query_that_is_stopped_does_not_begin() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads here")]
 fn another_thread_stops_a_query_under_way() {
     const COUNT: usize = 512;
     let mesh = baked(&fan(COUNT));

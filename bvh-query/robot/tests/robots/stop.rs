@@ -70,6 +70,7 @@ fn a_question_that_is_stopped_does_not_begin() {
 }
 
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads here")]
 fn another_thread_stops_questions_under_way() {
     let random = &mut Random::new(2);
     let rows: Vec<_> = (0..40).map(|_| random_values(random, &cell(Base::Fixed))).collect();

@@ -102,6 +102,7 @@ fn answers_are_those_of_a_robot_that_remembers_nothing() {
 
 /// What a clone remembers is of its own world: one of two robots that shared it moves an obstacle.
 #[test]
+#[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads here")]
 fn a_robot_forgets_what_it_moves_and_others_do_not() {
     let mut robot = arm(Base::Fixed);
     robot.add_obstacle("pillar", block([0.1, 0.1, 1.5]), &at([0.45, 0.0, 0.75])).unwrap();
