@@ -34,18 +34,25 @@ impl OuterBox {
             return Self::EMPTY;
         }
         let outward = |end: f64| end.abs() * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE);
-        Self {
-            lo: inner.lo.map(|end| (end - outward(end)) as f32),
-            hi: inner.hi.map(|end| (end + outward(end)) as f32),
+        let mut outer = Self::EMPTY;
+        for k in 0..3 {
+            outer.lo[k] = (inner.lo[k] - outward(inner.lo[k])) as f32;
+            outer.hi[k] = (inner.hi[k] + outward(inner.hi[k])) as f32;
         }
+        outer
     }
 
     pub(super) fn girth(&self) -> f64 {
         self.to_world().girth()
     }
 
+    #[inline(always)]
     fn to_world(self) -> WorldBox {
-        WorldBox { lo: self.lo.map(f64::from), hi: self.hi.map(f64::from) }
+        let mut world = WorldBox::EMPTY;
+        for k in 0..3 {
+            (world.lo[k], world.hi[k]) = (self.lo[k].into(), self.hi[k].into());
+        }
+        world
     }
 }
 
@@ -105,18 +112,24 @@ impl Node {
 
     #[inline(always)]
     fn part(&self, lane: usize) -> Subtree {
-        let bounds =
-            OuterBox { lo: [0, 1, 2].map(|k| self.lo[k][lane]), hi: [0, 1, 2].map(|k| self.hi[k][lane]) };
+        let mut bounds = OuterBox::EMPTY;
+        for k in 0..3 {
+            (bounds.lo[k], bounds.hi[k]) = (self.lo[k][lane], self.hi[k][lane]);
+        }
         Subtree { child: self.children[lane], bounds, groups: self.groups[lane] }
     }
 
     /// Computes what is around all children. Returns whether it has changed.
     fn unite(&mut self) -> bool {
-        let bounds = OuterBox {
-            lo: self.lo.map(|ends| fold(ends, |x, y| if y < x { y } else { x })),
-            hi: self.hi.map(|ends| fold(ends, |x, y| if y > x { y } else { x })),
-        };
-        let union = self.groups[..self.count].iter().fold(Groups::NONE, |union, groups| union.union(*groups));
+        let (mut bounds, mut union) = (self.part(0).bounds, self.groups[0]);
+        // Often just one instance moves.
+        if self.count > 1 {
+            for k in 0..3 {
+                bounds.lo[k] = fold(self.lo[k], |x, y| if y < x { y } else { x });
+                bounds.hi[k] = fold(self.hi[k], |x, y| if y > x { y } else { x });
+            }
+            union = self.groups[..self.count].iter().fold(union, |union, groups| union.union(*groups));
+        }
         let is_new = (bounds, union) != (self.bounds, self.union);
         (self.bounds, self.union) = (bounds, union);
         is_new
