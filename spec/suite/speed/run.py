@@ -354,11 +354,13 @@ class Measurement:
 
 
 def machine():
-    """Returns the name of the processor, as well as the system tells it."""
+    """Returns the name of the processor and its vector units, as well as the system tells them."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
+        name, flags = (next(line.split(":", 1)[1].strip() for line in lines if line.startswith(key)) for key in ("model name", "flags"))
+        units = next((title for flag, title in (("avx512bw", "AVX-512"), ("avx2", "AVX2")) if flag in flags.split()), None)
+        return f"{name} with {units}" if units else name
+    except (OSError, StopIteration, RuntimeError):
         return platform.processor() or platform.machine()
 
 
