@@ -18,6 +18,8 @@ use crate::turning::{MAX_TRIANGLES, TurningCodes, TurningSlab, decode_turning};
 use crate::validate::packets as packets_of;
 
 /// A child of a treelet or a subtree root of a page, with both of its bounds.
+///
+/// [`visit_bounds`] has an example.
 pub struct Bound<'a> {
     /// The treelet's slot.
     pub slot: u8,
@@ -37,6 +39,8 @@ pub struct Bound<'a> {
 }
 
 /// The part of the tree below a subtree root.
+///
+/// [`visit_bounds`] has an example.
 #[derive(Debug, Clone)]
 pub struct Subtree {
     /// The slabs of the root's anchor.
@@ -132,6 +136,26 @@ impl Patches {
 /// Visits all subtree roots and children of a page, and returns the subtrees of the roots.
 ///
 /// The page and its leaf block must have been checked. `below` returns the subtrees of roots in later pages.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::bounds::{Bound, Subtree, visit_bounds};
+/// use bvh_format::page::{Page, check_page};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let object = &layout.objects[0]; // a cube from -1 to 1, in one page
+/// let page = layout.page_bytes(&bytes, 0).expect("a page");
+/// check_page(page, 0, object, layout.page_offset(0))?;
+/// let page = Page::new(page, object.profile());
+/// let leaves = layout.leaf_block(&bytes, page.header());
+/// let roots = visit_bounds(object, &page, leaves, |_| Subtree::unknown(), |Bound { decoded, tight, .. }| {
+///     assert!((0..3).all(|axis| decoded.lo[axis] <= tight.lo[axis] && tight.hi[axis] <= decoded.hi[axis]));
+///     Ok(())
+/// })?;
+/// assert_eq!((roots[0].kdop.lo[0], roots[0].kdop.hi[0]), (-1.0, 1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// The first error of `visit`.
@@ -298,6 +322,17 @@ pub fn check_box(layout: &Layout, object: &Object, root: &Subtree) -> Result<(),
 }
 
 /// How much wider decoded bounds are than tight ones, as sums over nodes.
+///
+/// ```
+/// use bvh_format::bounds::Inflation;
+/// use bvh_format::kdop::Kdop;
+///
+/// let tight = Kdop::of_points([[0.0; 3], [1.0; 3]]);
+/// let decoded = Kdop::of_points([[0.0; 3], [2.0, 1.0, 1.0]]);
+/// let mut inflation = Inflation::default();
+/// inflation.add(&decoded, &tight, 3, &[0.0; 13]);
+/// assert_eq!((inflation.mean_width(), inflation.mean_volume()), ((2.0 + 1.0 + 1.0) / 3.0, 2.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Inflation {
     /// The nodes that have been counted.

@@ -9,6 +9,15 @@ pub fn checksum(bytes: &[u8]) -> u64 {
 }
 
 /// Computes the same checksum from bytes that arrive in pieces.
+///
+/// ```
+/// use bvh_format::checksum::{Hasher, checksum};
+///
+/// let mut hasher = Hasher::default();
+/// hasher.update(b"one part, ");
+/// hasher.update(b"and another");
+/// assert_eq!(hasher.finish(), checksum(b"one part, and another"));
+/// ```
 #[derive(Default)]
 pub struct Hasher(xxh3::Xxh3);
 

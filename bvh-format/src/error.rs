@@ -4,6 +4,18 @@ use crate::rule::Rule;
 
 /// A breach of the format. Its text is one line, which names the byte offset in the file, the rule, what was expected
 /// there, what was found, and the remedy.
+///
+/// ```
+/// use bvh_format::{Layout, Rule};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let mut damaged = bytes.clone();
+/// damaged[16] ^= 1; // in the length of the file, which the checksum of the header covers
+/// let error = Layout::read(&damaged).unwrap_err();
+/// assert_eq!(error.rule, Rule::HeaderChecksum);
+/// println!("{error}"); // names the byte, what was expected there, and what to do
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("byte {offset}: {rule}: expected {expected}, found {found}; {}", .rule.remedy())]
 #[non_exhaustive]

@@ -31,6 +31,20 @@ pub fn version_name((major, minor): (u16, u16)) -> String {
 }
 
 /// The first 64 bytes of a file.
+///
+/// ```
+/// use bvh_format::header::{Header, SectionEntry, head_bytes, version_name};
+/// use zerocopy::FromBytes;
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let (header, rest) = Header::ref_from_prefix(&bytes).expect("a header of 64 bytes");
+/// assert_eq!(header.file_length.get(), bytes.len() as u64);
+/// println!("version {}", version_name((header.major.get(), header.minor.get())));
+/// let sections = header.sections.get() as usize;
+/// let table = &rest[..head_bytes(sections) - size_of::<Header>()];
+/// assert_eq!(<[SectionEntry]>::ref_from_bytes(table).map(<[_]>::len), Ok(sections));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Header {
@@ -53,6 +67,8 @@ pub struct Header {
 }
 
 /// An entry of the section table.
+///
+/// [`Header`] has an example.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
 #[repr(C)]
 pub struct SectionEntry {
@@ -71,6 +87,8 @@ pub struct SectionEntry {
 const _: () = assert!(size_of::<Header>() == 64 && size_of::<SectionEntry>() == 32);
 
 /// The sections of version 1.0. Later minor versions of the format may add kinds.
+///
+/// [`Section`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[repr(u32)]
@@ -143,6 +161,20 @@ impl SectionKind {
 }
 
 /// A section of a file: its kind and its place.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::checksum::checksum;
+/// use bvh_format::header::{Section, SectionKind};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// for Section { kind, range, checksum: stated } in Layout::read(&bytes)?.sections {
+///     assert_eq!(stated, checksum(&bytes[range.clone()]));
+///     assert_eq!(range.start % kind.alignment(), 0);
+///     assert!(kind == SectionKind::Provenance || kind.is_content());
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Section {
     /// What the section holds.

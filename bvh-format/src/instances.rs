@@ -18,6 +18,8 @@ pub const MAX_RIGID_ERROR: f64 = 1.0 / (1u64 << 23) as f64;
 const TABLE_HEAD: usize = 16;
 
 /// The record of an instance as stored.
+///
+/// [`Instance`] has an example.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct InstanceRecord {
@@ -44,6 +46,22 @@ pub struct InstanceRecord {
 const _: () = assert!(size_of::<InstanceRecord>() == 128);
 
 /// An object with a pose in the world. A point `x` of the object, in mesh units, is at `R x + t`.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::instances::{Instance, InstanceRecord, write_instances};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-scene.cbvh"))?;
+/// let instances = Layout::read(&bytes)?.read_instances(&bytes[..])?;
+/// assert!(instances.iter().all(|instance| instance.pose_fault().is_none()));
+///
+/// let tilted = Instance { rotation: [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ..Instance::of_object(0) };
+/// assert_eq!(tilted.pose_fault(), Some(("a rotation within 2^-23 of orthonormal", 0.5)));
+///
+/// let section = write_instances(&instances); // a head, the records, and the names
+/// assert!(section.len() > instances.len() * size_of::<InstanceRecord>());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
     /// The name. Several instances may have an empty one; all others differ.

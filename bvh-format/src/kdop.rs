@@ -30,6 +30,14 @@ pub const DIRECTIONS: [[i8; 3]; 13] = [
 ///
 /// The list is part of the major version of the format. It is not marked as non-exhaustive: code that has a case for
 /// each set does not compile until it has one for a new set.
+///
+/// ```
+/// use bvh_format::kdop::{DIRECTIONS, DirectionSet};
+///
+/// assert_eq!(DirectionSet::Dop14.slabs(), 7);
+/// assert_eq!(DIRECTIONS[..DirectionSet::Dop6.slabs()], [[1, 0, 0], [0, 1, 0], [0, 0, 1]]);
+/// assert_eq!(DirectionSet::Dop14.max(DirectionSet::Dop26), DirectionSet::Dop26);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum DirectionSet {
     /// 3 slabs: an axis-aligned box.
@@ -57,6 +65,15 @@ impl DirectionSet {
 }
 
 /// A k-DOP with slabs along all 13 directions. Code for a smaller set neither reads nor writes the others.
+///
+/// ```
+/// use bvh_format::kdop::Kdop;
+///
+/// let kdop = Kdop::of_points([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]);
+/// assert_eq!((kdop.lo[0], kdop.hi[0]), (0.0, 1.0)); // along x
+/// assert_eq!((kdop.lo[3], kdop.hi[3]), (0.0, 6.0)); // x + y + z
+/// assert_eq!((kdop.lo[10], kdop.hi[10]), (-1.0, 0.0)); // x - y
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kdop {
     /// Lower ends, rounded down.

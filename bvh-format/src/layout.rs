@@ -17,6 +17,23 @@ use zerocopy::FromBytes;
 use zerocopy::little_endian::U32;
 
 /// Where everything is in a file. Reading it takes the head of the file and the object table, and nothing else.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::page::{Page, check_page};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// for object in &layout.objects {
+///     for number in object.pages() {
+///         let page = layout.page_bytes(&bytes, number).expect("a page of the file");
+///         check_page(page, number, object, layout.page_offset(number))?;
+///         let header = Page::new(page, object.profile()).header();
+///         println!("page {number}: {} treelets, {} packets", header.treelets, header.packets);
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Major and minor version.
@@ -418,6 +435,21 @@ impl PairsInOrder {
 
 /// Computes the content checksum: XXH3 of the kind (`u32`), the length (`u64`) and the bytes of each content section, in
 /// the order of the file. Equal meshes that are baked with equal options have equal content checksums.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::layout::ContentHasher;
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let mut hasher = ContentHasher::default();
+/// for section in layout.sections.iter().filter(|section| section.kind.is_content()) {
+///     hasher.begin(section.kind, section.range.len() as u64);
+///     hasher.update(&bytes[section.range.clone()]);
+/// }
+/// assert_eq!(hasher.finish(), layout.content_checksum);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Default)]
 pub struct ContentHasher(Hasher);
 

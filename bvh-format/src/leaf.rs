@@ -31,6 +31,18 @@ pub const LINE: usize = 64;
 ///
 /// The list is part of the major version of the format. It is not marked as non-exhaustive: code that has a case for
 /// each encoding does not compile until it has one for a new encoding.
+///
+/// ```
+/// use bvh_format::leaf::{Packet, TriangleEncoding, decode_packet, encode_block};
+/// use bvh_format::vertex::Vertices;
+///
+/// let packets = [Packet::new(&[[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]); 8];
+/// for encoding in TriangleEncoding::ALL {
+///     let block = encode_block(encoding, &packets, &[0, 1, 2, 3, 4, 5, 6, 7], &Vertices::around([0.0; 3]), &[]);
+///     println!("{}: {} bytes", encoding.name(), block.len());
+///     assert_eq!(decode_packet(encoding, &block, 7), packets[7]);
+/// }
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum TriangleEncoding {
@@ -62,6 +74,17 @@ impl TriangleEncoding {
 }
 
 /// Four triangles in lane order: `corners[corner][axis][lane]`.
+///
+/// ```
+/// use bvh_format::leaf::Packet;
+///
+/// let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
+/// let packet = Packet::new(&[triangle]);
+/// assert_eq!(packet.triangle(0), triangle);
+/// assert_eq!(packet.triangle(3), triangle); // unused lanes repeat the last triangle
+/// assert_eq!(packet.corners[2][1], [2.0; 4]); // y of the third corners
+/// assert_eq!(packet.kdop(1, 3).hi[..3], [1.0, 2.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Packet {
@@ -122,6 +145,8 @@ impl Packet {
 }
 
 /// The vertices behind the offsets of a packet, in the same order: `corners[corner][axis][lane]`.
+///
+/// [`VertexBlock`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidePacket {
     /// Coordinates in mesh units.
@@ -220,6 +245,18 @@ pub(crate) fn corrections_of(
 }
 
 /// Reads the vertices behind the packets of a leaf block. Bytes beyond the block read as zero.
+///
+/// ```
+/// use bvh_format::leaf::{Packet, TriangleEncoding, VertexBlock, WidePacket, encode_block};
+/// use bvh_format::vertex::Vertices;
+///
+/// let vertices = Vertices { corrected: [true; 3], left_out: [1e-8; 3], ..Vertices::around([0.0; 3]) };
+/// let triangle = [[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.3]]; // 0.1 and 0.3 are no f32 numbers
+/// let offsets = triangle.map(|corner| corner.map(|coordinate: f64| coordinate as f32));
+/// let (packet, wide) = (Packet::new(&[offsets]), WidePacket::new(&[triangle]));
+/// let block = encode_block(TriangleEncoding::F32, &[packet], &[0], &vertices, &[wide]);
+/// assert_eq!(VertexBlock::new(TriangleEncoding::F32, &vertices, &block, 1).triangle(0, 0), triangle);
+/// ```
 #[derive(Clone, Copy)]
 pub struct VertexBlock<'a> {
     encoding: TriangleEncoding,

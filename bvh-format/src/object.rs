@@ -21,6 +21,8 @@ pub const MAX_RADIUS: f64 = (1u128 << 118) as f64;
 pub(crate) const TABLE_HEAD: usize = 16;
 
 /// The record of an object as stored. Lengths are in mesh units, and coordinates are relative to `origin`.
+///
+/// [`Object`] has an example.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct ObjectRecord {
@@ -89,6 +91,21 @@ pub struct ObjectRecord {
 const _: () = assert!(size_of::<ObjectRecord>() == 192);
 
 /// An object of an opened file: a named mesh with a tree of its own.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::object::{ObjectRecord, Volumes};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let cube = &layout.objects[0];
+/// assert_eq!((cube.triangles(), cube.bounding_box()), (12, [[-1.0; 3], [1.0; 3]]));
+/// let Volumes { half_sides, .. } = cube.volumes();
+/// assert_eq!(*half_sides, [1.0; 3]);
+/// let record: &ObjectRecord = cube.record();
+/// assert_eq!((record.input_triangles.get(), record.duplicates.get()), (12, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     pub(crate) name: String,
@@ -102,6 +119,8 @@ pub struct Object {
 
 /// The bounding volumes of an object in `f64`, as computations need them. Lengths are in mesh units, and centres are relative
 /// to the origin.
+///
+/// [`Object`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volumes {
     /// The origin.

@@ -27,6 +27,28 @@ pub const MAX_LISTED_TRIANGLES: usize = 4;
 /// The open edges of an object or of several. There are none if all objects are closed.
 ///
 /// The text of this type says how many edges of which kind there are, and what to do about them.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::open_edges::{OpenEdge, count, edges_of_page};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-topology.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let (number, object) = (1, &layout.objects[1]); // a cube without one of its triangles
+/// let edges = count(number as u32, object.pages(), 1000, &mut |page| {
+///     let page = layout.read_page(&bytes[..], page).ok()?;
+///     let page = page.page(object);
+///     let (leaves, ids) = (layout.leaf_block(&bytes, page.header()), layout.id_block(&bytes, page.header()));
+///     Some(edges_of_page(object, &page, leaves, Some(ids), &|_| 1))
+/// });
+/// let edges = edges.expect("few edges");
+/// assert_eq!((edges.count(), edges.boundary.count), (3, 3)); // the edges of the hole
+/// for OpenEdge { ends, triangles, .. } in &edges.boundary.first {
+///     println!("triangle {} from {:?} to {:?}", triangles[0], ends[0], ends[1]);
+/// }
+/// assert_eq!(edges.proposed_weld(), None); // a hole is no crack
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct OpenEdges {
@@ -41,6 +63,8 @@ pub struct OpenEdges {
 }
 
 /// The open edges of one kind.
+///
+/// [`OpenEdges`] has an example.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct EdgesOfKind {
@@ -51,6 +75,8 @@ pub struct EdgesOfKind {
 }
 
 /// An open edge.
+///
+/// [`OpenEdges`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct OpenEdge {
@@ -76,6 +102,8 @@ pub struct OpenEdge {
 ///
 /// If an object has more than [`MAX_MEASURED`] open edges, only the first that many are measured, among each other, in the order of the
 /// bits of their ends.
+///
+/// [`Classifier`] has an example.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Gaps {

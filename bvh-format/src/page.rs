@@ -53,6 +53,8 @@ const MAX_ROOTS_PER_PAGE: usize = 63;
 const MAX_REMOTES_PER_PAGE: usize = 255;
 
 /// The first line of a page.
+///
+/// [`Page`] has an example.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug)]
 #[repr(C)]
 pub struct PageHeader {
@@ -118,6 +120,13 @@ fn bytes_of_units(first: u64, count: u32, unit: usize) -> Range<usize> {
 }
 
 /// A reference to a subtree root: the page in the upper 26 bits, the root's number within the page in the lower 6.
+///
+/// ```
+/// use bvh_format::page::RootRef;
+///
+/// let root = RootRef::new(1000, 5);
+/// assert_eq!((root.page(), root.root(), root.0), (1000, 5, 1000 << 6 | 5));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RootRef(pub u32);
 
@@ -142,6 +151,8 @@ impl RootRef {
 }
 
 /// A subtree root's slabs, and the remote link that leads to it.
+///
+/// [`Page`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
     /// The root's slabs.
@@ -153,6 +164,15 @@ pub struct Anchor {
 }
 
 /// The numbers of roots, remote links and treelets of a page, which determine the places of its parts.
+///
+/// ```
+/// use bvh_format::page::PageShape;
+/// use bvh_format::profile::Profile;
+///
+/// let shape = PageShape { roots: 1, remotes: 10, treelets: 40, short: 8 };
+/// assert!(shape.fits(Profile::Dop14U8));
+/// assert!(!shape.fits(Profile::Dop14F32)); // whose treelets are four times as large
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PageShape {
     /// Subtree roots, which are among the treelets.
@@ -197,6 +217,8 @@ fn link_at(profile: Profile, roots: u8, link: u8) -> usize {
 }
 
 /// The numbers in a page header that depend on the pages before it.
+///
+/// [`PagePatcher`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PagePlace {
     /// Number of the page in the node section.

@@ -3,6 +3,8 @@
 use crate::kdop::DirectionSet;
 
 /// How the slab ends of a child are stored. Like [`Profile`], the list is complete and not marked as non-exhaustive.
+///
+/// [`Profile`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// A residual of 4 bits, in units of 1/15 of the parent's slab.
@@ -19,6 +21,16 @@ pub enum Encoding {
 ///
 /// The list is part of the major version of the format. It is not marked as non-exhaustive: a decoder that has code for
 /// each profile does not compile until it has code for a new one.
+///
+/// ```
+/// use bvh_format::kdop::DirectionSet;
+/// use bvh_format::profile::{Encoding, Profile};
+///
+/// let profile = Profile::from_name("dop14-u8").expect("a name of the command line");
+/// assert_eq!(profile, Profile::Dop14U8);
+/// assert_eq!((profile.directions(), profile.encoding()), (DirectionSet::Dop14, Encoding::U8));
+/// assert_eq!((profile.width(), profile.treelet_bytes()), (4, 64));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Profile {

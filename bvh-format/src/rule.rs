@@ -6,6 +6,15 @@ macro_rules! rules {
     ($($name:ident = $number:literal, $text:literal;)*) => {
         /// A numbered rule of `spec/format.md`, section 16.2. Errors and the names of test files state its number.
         /// Later minor versions of the format may add rules.
+        ///
+        /// ```
+        /// use bvh_format::Rule;
+        ///
+        /// let rule = Rule::PageChecksum;
+        /// assert_eq!((rule.number(), rule.text()), (15, "the checksum in a page header is that of the page"));
+        /// assert_eq!(rule.to_string(), format!("R15 ({})", rule.text()));
+        /// println!("{}", rule.remedy());
+        /// ```
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[non_exhaustive]
         pub enum Rule { $(#[doc = $text] $name = $number,)* }

@@ -10,6 +10,18 @@ pub const fn row(slab: usize) -> usize {
 }
 
 /// The decoded slabs of one node, by [row]. Rows that have no slab of the profile are meaningless.
+///
+/// ```
+/// use bvh_format::kdop::Kdop;
+/// use bvh_format::slabs::{Group, NodeSlabs, row};
+///
+/// let kdop = Kdop::of_points([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]);
+/// let node = NodeSlabs::from_kdop(&kdop, 13);
+/// assert_eq!((node.hi[row(3)], node.hi[row(7)]), (6.0, 3.0)); // x + y + z, and x + y
+/// assert_eq!(node.to_kdop(13), kdop);
+/// let group = Group::of_one(&node);
+/// assert_eq!(group.rows()[16 + row(3)][0], 6.0); // upper ends follow the 16 rows of lower ones
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeSlabs {
     /// Lower ends by row.
@@ -42,6 +54,8 @@ impl NodeSlabs {
 
 /// The decoded slabs of four children in the order of vector registers: element `4 * r + c` of register `q` is row
 /// `4 * q + r` of child `c`. Elements of absent children, and of rows that have no slab of the profile, are meaningless.
+///
+/// [`NodeSlabs`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Group {

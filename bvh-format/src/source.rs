@@ -24,6 +24,37 @@ const _: () = assert!(MAX_PACKED_BLOCK_BYTES <= MAX_BLOCK_BYTES);
 const _: () = assert!(MAX_PACKETS_PER_PAGE * F32_PACKET_BYTES + LINE <= MAX_BLOCK_BYTES);
 
 /// The bytes of a file, of which several threads may read pieces at a time.
+///
+/// Bytes in memory are a source. So is what counts how much of them is read:
+///
+/// ```
+/// use bvh_format::source::Source;
+/// use bvh_format::{FormatError, Layout};
+/// use std::borrow::Cow;
+/// use std::ops::Range;
+/// use std::sync::atomic::{AtomicUsize, Ordering};
+///
+/// struct Counted<'a>(&'a [u8], AtomicUsize);
+///
+/// impl Source for Counted<'_> {
+///     type Error = FormatError;
+///
+///     fn length(&self) -> u64 {
+///         self.0.len() as u64
+///     }
+///
+///     fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, FormatError> {
+///         self.1.fetch_add(range.len(), Ordering::Relaxed);
+///         self.0.read(range)
+///     }
+/// }
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let counted = Counted(&bytes, AtomicUsize::new(0));
+/// let layout = Layout::read_from(&counted)?;
+/// assert_eq!(layout.objects.len(), 1);
+/// assert!(counted.1.into_inner() < bytes.len()); // no page
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Source: Sync {
     /// Why a piece cannot be read, or what is wrong with the file.
     type Error: From<FormatError> + Send;
@@ -58,6 +89,8 @@ pub fn chunks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
 }
 
 /// The bytes of a page that has not been checked.
+///
+/// [`validate_page`](crate::validate::validate_page) has an example.
 pub struct PageBytes<'a>(Cow<'a, [u8]>);
 
 impl<'a> PageBytes<'a> {
@@ -74,6 +107,8 @@ impl<'a> PageBytes<'a> {
 
 /// A leaf block or an id block that has not been checked. If it is longer than any block that keeps the rules, this
 /// holds only its first bytes, and the checksum of all. A block that does not lie within its section is empty.
+///
+/// [`validate_page`](crate::validate::validate_page) has an example.
 pub struct Block<'a> {
     bytes: Cow<'a, [u8]>,
     /// The length and the checksum of a block that is too long.

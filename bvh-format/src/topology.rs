@@ -19,6 +19,8 @@ pub const HEAD_BYTES: usize = 16;
 pub const LANES: u64 = crate::leaf::PACKET as u64;
 
 /// The record of an object as stored.
+///
+/// [`ObjectTopology`] has an example.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct TopologyRecord {
@@ -33,6 +35,8 @@ pub struct TopologyRecord {
 }
 
 /// The stored count of a triangle whose duplicates were left out.
+///
+/// [`ObjectTopology`] has an example.
 #[derive(FromBytes, IntoBytes, KnownLayout, Immutable, Unaligned, Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Net {
@@ -46,6 +50,23 @@ pub struct Net {
 const _: () = assert!(size_of::<TopologyRecord>() == 16 && size_of::<Net>() == 8);
 
 /// What the section states about an object: whether it is closed, and which bytes of the file are its lists.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::topology::{Net, TopologyRecord, write_topology_head};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-topology.cbvh"))?;
+/// let topology = Layout::read(&bytes)?.check_topology(&bytes[..])?;
+/// assert_eq!(topology.iter().map(|object| object.closed).collect::<Vec<_>>(), [true, false, true, false]);
+/// // The third object is a cube around a smaller one, each triangle of which was given three times.
+/// assert_eq!(topology[2].component_count(), 2);
+/// let nets: &[Net] = topology[2].nets(&bytes);
+/// assert!(nets.len() == 12 && nets.iter().all(|net| net.net.get() == 3));
+///
+/// let record = TopologyRecord { closed: 1.into(), components: 1.into(), nets: 0.into(), reserved: 0.into() };
+/// assert_eq!(write_topology_head(&[record]).len(), 16 + size_of::<TopologyRecord>());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjectTopology {
     /// Whether the triangles have no boundary, each counted as often as its net says.

@@ -28,6 +28,8 @@ pub const SHORT_CODES: [u8; 16] = [0, 10, 21, 32, 44, 55, 67, 78, 90, 103, 116, 
 
 /// One child of a treelet. The list of variants is part of the major version of the format, and each reader must handle
 /// all of them.
+///
+/// [`Links`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Child {
     /// There is no child in this place.
@@ -59,6 +61,20 @@ pub(crate) enum ChildKind {
 }
 
 /// The links of a treelet, as stored.
+///
+/// ```
+/// use bvh_format::profile::Profile;
+/// use bvh_format::treelet::{Child, Links};
+///
+/// // A treelet, a remote link, and a packet of two triangles.
+/// let links = Links { kinds: 0x521, first_treelet: 3, first_remote: 9, first_leaf: 20, ..Links::NONE };
+/// let mut treelet = [0; 64];
+/// links.write(Profile::Dop14U8, &mut treelet);
+/// assert_eq!(Links::read(Profile::Dop14U8, &treelet), links);
+/// assert_eq!(links.children(), 3);
+/// assert_eq!((links.child(0), links.child(1)), (Child::Treelet(3), Child::Remote(9)));
+/// assert_eq!((links.child(2), links.child(3)), (Child::Leaf { packet: 20, triangles: 2 }, Child::Empty));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Links {
     /// The kinds of the children: one nibble per child, that of child 0 lowest.

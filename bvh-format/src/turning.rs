@@ -30,6 +30,8 @@ pub const END_ROW: usize = 7;
 pub const DIRECTION_ROW: usize = 14;
 
 /// The direction of a turning slab, as two codes.
+///
+/// [`TurningSlab`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TurningDirection {
     /// 127 more than the first integer, `a`.
@@ -64,6 +66,20 @@ impl TurningDirection {
 }
 
 /// A slab along a direction of its own: `lo <= direction . v <= hi`, in mesh units times the direction's length.
+///
+/// ```
+/// use bvh_format::leaf::Packet;
+/// use bvh_format::turning::{TurningDirection, TurningSlab};
+///
+/// // A triangle in the plane x + 2 z = 1.
+/// let packet = Packet::new(&[[[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.5]]]);
+/// let direction = TurningDirection::near([1.0, 0.0, 2.0]);
+/// let slab = TurningSlab::around(direction, [&packet], [0.0; 3]);
+/// assert!(slab.contains([&packet], [0.0; 3]));
+/// assert!(slab.hi - slab.lo < 0.02); // its box is 1 wide
+/// let beside = Packet::new(&[[[1.0, 0.0, 0.1]; 3]]);
+/// assert!(!slab.contains([&beside], [0.0; 3]));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurningSlab {
     /// The direction.
@@ -173,6 +189,22 @@ fn places(profile: Profile, child: usize) -> [usize; 4] {
 
 /// The bytes of the turning slabs of four children, in rows of four: the codes of the lower ends, of the upper ends, and
 /// both codes of the directions.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::page::{Page, check_page};
+/// use bvh_format::turning::TurningCodes;
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-turning.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let object = &layout.objects[0];
+/// let page = layout.page_bytes(&bytes, 0).expect("a page");
+/// check_page(page, 0, object, layout.page_offset(0))?;
+/// let page = Page::new(page, object.profile());
+/// let codes = |slot| TurningCodes::read(page.treelet(slot).first_chunk().expect("128 bytes"));
+/// assert!((0..page.header().treelets).any(|slot| codes(slot).any())); // a ball has flat parts
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TurningCodes(pub [u8; 16]);
 

@@ -31,6 +31,39 @@ use std::ops::Range;
 const PAGES_PER_BATCH: u32 = 1 << 12;
 
 /// How the work of [`validate_with`] is shared: by one thread, or by several.
+///
+/// ```
+/// use bvh_format::validate::{Workers, validate_with};
+/// use std::ops::Range;
+///
+/// /// Checks the sections on a thread of their own.
+/// struct TwoThreads;
+///
+/// impl Workers for TwoThreads {
+///     fn both<A: Send, B: Send, E: Send>(
+///         &self,
+///         a: impl FnOnce() -> Result<A, E> + Send,
+///         b: impl FnOnce() -> Result<B, E> + Send,
+///     ) -> Result<(A, B), E> {
+///         std::thread::scope(|threads| {
+///             let a = threads.spawn(a);
+///             let b = b();
+///             Ok((a.join().expect("no panic")?, b?))
+///         })
+///     }
+///
+///     fn each<T: Send, E: Send>(
+///         &self,
+///         pages: Range<u32>,
+///         check: impl Fn(u32) -> Result<T, E> + Sync + Send,
+///     ) -> Result<Vec<T>, E> {
+///         pages.map(check).collect()
+///     }
+/// }
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// assert_eq!(validate_with(&bytes[..], &TwoThreads)?.objects.len(), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Workers: Sync {
     /// Runs both functions, perhaps at the same time.
     ///
@@ -196,6 +229,8 @@ fn check_object<S: Source + ?Sized>(
 }
 
 /// A page that has been validated, except for the targets of its remote links.
+///
+/// [`validate_page`] has an example.
 pub struct ValidatedPage<'a> {
     /// The bytes of the page.
     pub bytes: PageBytes<'a>,
@@ -209,6 +244,26 @@ pub struct ValidatedPage<'a> {
 
 /// Reads a page and its blocks, and checks them value by value, except for the targets of remote links. `closed` tells
 /// whether the file states that the object is closed.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::source::{Block, PageBytes};
+/// use bvh_format::validate::{Counts, ValidatedPage, validate_page};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let object = &layout.objects[0];
+/// let mut counts = Counts::default();
+/// for number in object.pages() {
+///     let ValidatedPage { bytes: page, leaves, counts: of_page, .. }: ValidatedPage<'_> =
+///         validate_page(&layout, &bytes[..], object, false, number)?;
+///     let (page, leaves): (PageBytes<'_>, Block<'_>) = (page, leaves);
+///     assert_eq!(leaves.bytes().len(), page.page(object).header().leaf_bytes().len());
+///     counts = counts.followed_by(&of_page, &layout)?;
+/// }
+/// counts.check(&layout, object)?; // as many as the object table states
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// The first of rules 15 to 33, 37, 38 and 52 that does not hold, or an error of the source.

@@ -31,6 +31,8 @@ pub const MAX_DECIMALS: u8 = 22;
 const LEAST_SHORTEST: u8 = 6;
 
 /// How the coordinates of an axis follow from the sum s of the origin and an offset, unless they are corrected.
+///
+/// [`Vertices`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Predictor {
     /// s itself.
@@ -77,6 +79,17 @@ impl Predictor {
 }
 
 /// How the vertices of an object follow from what is stored.
+///
+/// ```
+/// use bvh_format::vertex::{Predictor, Vertices};
+///
+/// let decimals = Vertices { predictors: [Predictor::Decimals(2); 3], ..Vertices::around([100.0; 3]) };
+/// let offset = (100.07_f64 - 100.0) as f32;
+/// assert_eq!(decimals.coordinate(0, offset, 0), 100.07); // the f64 number, to the bit
+/// assert_ne!(Vertices::around([100.0; 3]).coordinate(0, offset, 0), 100.07);
+/// let correction = decimals.correction(0, offset, 100.070001).expect("a difference of f64 numbers");
+/// assert_eq!(decimals.coordinate(0, offset, correction), 100.070001);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vertices {
     /// The origin, in mesh units.

@@ -12,6 +12,18 @@ pub const CORRECTIONS_HEAD_BYTES: usize = 40;
 const CORNER_BYTES: usize = 2;
 
 /// The head of the corrections of a block.
+///
+/// ```
+/// use bvh_format::leaf::{Corrections, F32_PACKET_BYTES, LINE, Packet, TriangleEncoding, WidePacket, encode_block};
+/// use bvh_format::vertex::Vertices;
+///
+/// let vertices = Vertices { corrected: [true, false, false], left_out: [1e-8, 0.0, 0.0], ..Vertices::around([0.0; 3]) };
+/// let packet = Packet::new(&[[[0.1_f32, 0.0, 0.0]; 3]]);
+/// let wide = WidePacket::new(&[[[0.1_f64, 0.0, 0.0]; 3]]);
+/// let block = encode_block(TriangleEncoding::F32, &[packet], &[0], &vertices, &[wide]);
+/// let behind = &block[F32_PACKET_BYTES.next_multiple_of(LINE)..];
+/// assert_eq!(Corrections::read(behind).map(|head| head.counts), Some([12, 0, 0])); // x of all corners
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Corrections {
     /// For each axis, the number of corners with a correction: none, all, or those in a list.

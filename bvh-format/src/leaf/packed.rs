@@ -94,6 +94,20 @@ pub(super) fn in_units(integer: i32, divisor: f64) -> f32 {
 }
 
 /// The head of a packed block.
+///
+/// ```
+/// use bvh_format::leaf::{PackedHead, Packet, Record, TriangleEncoding, encode_block};
+/// use bvh_format::vertex::Vertices;
+///
+/// let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// let square = Packet::new(&[[a, b, c], [a, c, d]]);
+/// let block = encode_block(TriangleEncoding::Packed, &[square], &[0], &Vertices::around([0.0; 3]), &[]);
+/// let head = PackedHead::read(&block).expect("a packed block");
+/// assert_eq!(head.vertices, 4); // each is stored once
+/// let record: Record = head.record(&block, 0);
+/// let of_corner = |corner: usize, lane: usize| record.corners()[4 * corner + lane];
+/// assert_eq!(of_corner(0, 0), of_corner(0, 1)); // both triangles begin with the same vertex
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PackedHead {
     /// Vertices in the pool.
@@ -327,6 +341,8 @@ impl PackedHead {
 }
 
 /// The record of a packet: its vertices, and which of them its corners are.
+///
+/// [`PackedHead`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Record {
     pattern: u8,

@@ -100,6 +100,8 @@ fn hash(seed: u64, ends: &Ends) -> u64 {
 }
 
 /// Adds up the traversals of each edge, which come sorted.
+///
+/// [`Classifier`] has an example.
 #[derive(Default)]
 pub struct Sums {
     last: Option<(Ends, i64)>,
@@ -151,6 +153,8 @@ impl Sums {
 const MARKS: usize = 1 << 18;
 
 /// A set of edges that has all open ones.
+///
+/// [`Classifier`] has an example.
 pub struct OpenSet {
     /// The open edges, ascending, or `None` for all edges.
     edges: Option<Vec<Ends>>,
@@ -176,6 +180,26 @@ impl OpenSet {
 }
 
 /// Classifies the edges of an object, all traversals of which come sorted.
+///
+/// ```
+/// use bvh_format::open_edges::{Classifier, OpenSet, Sums, Traversal};
+///
+/// // Two triangles that share an edge but for a crack, as the edges of pages are.
+/// let edge = |x0: f64, x1: f64, y: f64, triangle, times: i64| -> Traversal {
+///     [x0.to_bits(), y.to_bits(), 0, x1.to_bits(), y.to_bits(), 0, triangle, times as u64]
+/// };
+/// let mut edges = vec![edge(0.0, 1.0, 0.0, 0, 1), edge(0.0, 1.0, 1e-9, 1, -1), edge(0.0, 1.0, 5.0, 2, 1), edge(0.0, 1.0, 5.0, 3, -1)];
+/// edges.sort_unstable();
+/// let mut sums = Sums::default();
+/// edges.iter().for_each(|edge| sums.add(edge, usize::MAX));
+/// let open: OpenSet = sums.finish(usize::MAX);
+/// open.keep(&mut edges);
+/// assert_eq!(edges.len(), 2); // the other two cancel
+/// let mut classifier = Classifier::new(0);
+/// edges.iter().for_each(|edge| classifier.add(edge));
+/// let gaps = classifier.finish().gaps;
+/// assert_eq!((gaps.cracks, gaps.nearest), (2, Some(1e-9)));
+/// ```
 pub struct Classifier {
     object: u32,
     edges: OpenEdges,

@@ -9,6 +9,31 @@ use super::{PAGE, Page, PagePlace, RootRef, page_checksum};
 use crate::profile::Profile;
 
 /// A page that has been written by a [`PageWriter`](super::PageWriter) and now gets its final numbers.
+///
+/// ```
+/// use bvh_format::kdop::Kdop;
+/// use bvh_format::leaf::TriangleEncoding;
+/// use bvh_format::page::{PagePatcher, PagePlace, PageShape, PageWriter, TightBound, WrittenPage};
+/// use bvh_format::profile::Profile;
+/// use bvh_format::vertex::Vertices;
+///
+/// let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let kdop = Kdop::of_points(triangle);
+/// let shape = PageShape { roots: 1, remotes: 0, treelets: 1, short: 0 };
+/// let mut writer = PageWriter::new(Profile::Dop14U8, 1.0, shape);
+/// writer.root(&kdop, None);
+/// writer.begin_treelet();
+/// writer.leaf(&TightBound::of_kdop(kdop), [(triangle, 7)].into_iter()); // its id is 7
+/// let WrittenPage { mut bytes, leaf_block, .. } =
+///     writer.finish(TriangleEncoding::F32, &Vertices::around([0.0; 3]), true);
+/// assert_eq!(leaf_block.len() % 64, 0);
+///
+/// let mut patcher = PagePatcher::new(&mut bytes, Profile::Dop14U8);
+/// let place = PagePlace { page: 3, leaf_line: 40, id_word: 9, first_packet: 20 };
+/// patcher.set_place(&place);
+/// assert_eq!(place.behind(patcher.page().header()).first_packet, 21);
+/// patcher.seal();
+/// ```
 pub struct PagePatcher<'a> {
     bytes: &'a mut [u8; PAGE],
     profile: Profile,

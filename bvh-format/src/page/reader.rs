@@ -11,6 +11,31 @@ use crate::treelet::{Links, SHORT_TREELET_BYTES};
 /// A view of a page that has passed [`check_page`](super::check_page), or is being checked.
 ///
 /// Over bytes that have not been checked, the accessors may return nonsense, but they never panic.
+///
+/// ```
+/// use bvh_format::Layout;
+/// use bvh_format::page::{Anchor, NO_PARENT, Page, PageHeader, check_page};
+/// use bvh_format::treelet::{Child, Links};
+///
+/// # let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-plain.cbvh"))?;
+/// let layout = Layout::read(&bytes)?;
+/// let object = &layout.objects[0];
+/// let page = layout.page_bytes(&bytes, 0).expect("a page");
+/// check_page(page, 0, object, layout.page_offset(0))?;
+/// let page = Page::new(page, object.profile());
+/// let header: &PageHeader = page.header();
+/// let Anchor { parent_page, slabs, .. } = page.anchor(0);
+/// assert_eq!((parent_page, slabs.lo[0], slabs.hi[0]), (NO_PARENT, -1.0, 1.0)); // x of the cube
+/// let mut found = 0;
+/// for slot in 0..header.treelets {
+///     let links: Links = page.links(slot);
+///     for child in (0..links.children()).map(|child| links.child(child)) {
+///         found += if let Child::Leaf { triangles, .. } = child { triangles } else { 0 };
+///     }
+/// }
+/// assert_eq!(found, 12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy)]
 pub struct Page<'a> {
     bytes: &'a [u8; PAGE],

@@ -22,6 +22,8 @@ use zerocopy::{FromZeros, IntoBytes};
 
 /// A page and its blocks. Until a [`PagePatcher`](super::PagePatcher) changes its numbers, it is page 0, its blocks are
 /// the first of their sections, and its checksum is missing.
+///
+/// [`PagePatcher`](super::PagePatcher) has an example.
 pub struct WrittenPage {
     /// The bytes of the page.
     pub bytes: Box<[u8; PAGE]>,
@@ -39,6 +41,8 @@ pub struct WrittenPage {
 /// call [`finish`](Self::finish). In the order of the calls, children that are treelets of this page take the next free
 /// slots, short ones the next slots after all others, and remote links and leaf packets the next free numbers. The
 /// children of a short treelet must all be packets.
+///
+/// [`PagePatcher`](super::PagePatcher) has an example.
 ///
 /// # Panics
 /// The methods panic if more is written than the shape has room for, or than the profile allows for a treelet.
@@ -63,6 +67,8 @@ pub struct PageWriter {
 }
 
 /// The tightest bound of the triangles below a child.
+///
+/// [`PagePatcher`](super::PagePatcher) has an example.
 #[derive(Debug, Clone, Copy)]
 pub struct TightBound {
     /// The slabs of the profile's directions.

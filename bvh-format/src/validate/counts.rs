@@ -8,6 +8,8 @@ use crate::object::Object;
 use crate::rule::Rule;
 
 /// The numbers of parts of one page, or of consecutive pages of an object together. The default stands for no page.
+///
+/// [`validate_page`](super::validate_page) has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     pub(super) first_page: u32,
