@@ -4,6 +4,8 @@ use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
 
 /// The time that a bake spends on a better tree. The answers and the guarantees are the same, and each bake is proved.
+///
+/// [`Options`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Effort {
@@ -38,6 +40,18 @@ impl Effort {
 }
 
 /// How a bake rounds the coordinates of its input.
+///
+/// ```
+/// use bvh_bake::{Options, Rounding, mesh::Mesh, to_bytes};
+///
+/// let mesh = Mesh::from_triangles(vec![[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+/// let (_, exact) = to_bytes(&mesh, &Options::default())?;
+/// let (_, rounded) = to_bytes(&mesh, &Options::default().round(Rounding::F32))?;
+/// assert_eq!(exact.file.max_vertex_rounding, 0.0);
+/// let moved = rounded.file.max_vertex_rounding; // rounded up
+/// assert!(f64::from(0.1_f32) - 0.1 <= moved && moved < 1.5e-9);
+/// # Ok::<(), bvh_bake::BakeError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Rounding {

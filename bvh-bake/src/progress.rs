@@ -9,6 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A stage of a bake, as shown to users.
+///
+/// [`Progress`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
     /// Chooses origins, rounds coordinates and finds duplicates.
@@ -35,6 +37,8 @@ impl Stage {
 
 /// A step of [`crate::FileBake`], in the order in which they begin. With several objects, those of
 /// [`Stage::Prepare`] and [`Stage::Build`] take turns.
+///
+/// [`Progress`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
     /// Reads the inputs, and checks whether the output is up to date.
@@ -75,6 +79,8 @@ impl Step {
 }
 
 /// The bytes that a bake asks the system to read and write. Repeated reads and writes count each time.
+///
+/// [`Progress`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Traffic {
     /// Bytes read from the inputs: each once, and once more if an existing output may be up to date.
@@ -105,6 +111,23 @@ impl Traffic {
 }
 
 /// The progress of a bake. Clones show the same bake, and each bake needs a progress of its own.
+///
+/// ```
+/// use bvh_bake::{FileBake, Progress, Stage, Step, Traffic};
+///
+/// # let folder = std::env::temp_dir().join(format!("cbvh-progress-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// # let output = folder.join("robot.cbvh");
+/// # let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/fclrob.obj");
+/// let (progress, mut steps) = (Progress::default(), Vec::new());
+/// FileBake::new([mesh], &output).progress(&progress).on_step(|step| steps.push(step)).run()?;
+/// assert_eq!(steps, Step::ALL);
+/// assert_eq!(progress.share(Step::Bake(Stage::Build)), Some(1.0)); // any thread may read it during the bake
+/// let Traffic { input_read, output_written, .. } = progress.traffic();
+/// assert!(input_read == std::fs::metadata(mesh)?.len() && output_written > 0);
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Progress(Arc<Counters>);
 

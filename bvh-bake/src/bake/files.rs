@@ -22,6 +22,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The outcome of [`FileBake::run`].
+///
+/// [`FileBake`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// The output has been written.

@@ -9,6 +9,8 @@ use bvh_format::profile::Profile;
 use bvh_format::topology::ObjectTopology;
 
 /// The outcome of a bake.
+///
+/// [`FileSummary`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BakeReport {
     /// The summary of the file: layout, counts, bytes and errors.
@@ -38,6 +40,16 @@ pub struct BakeReport {
 }
 
 /// Counts and sizes of a file, from its header and object table.
+///
+/// ```
+/// use bvh_bake::{BakeReport, Options, shapes, to_bytes};
+///
+/// let (bytes, report): (Vec<u8>, BakeReport) = to_bytes(&shapes::block([2.0, 2.0, 2.0])?, &Options::default())?;
+/// assert_eq!((report.file.triangles, report.file.closed), (12, Some(1)));
+/// assert_eq!(report.file.file_bytes, bytes.len() as u64);
+/// println!("{} with {}: {}", report.file.profile.name(), report.file.triangle_encoding.name(), report.reason);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSummary {
     /// The major and the minor version of the format.

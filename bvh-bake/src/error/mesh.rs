@@ -3,6 +3,15 @@
 use crate::limits::{MAX_TRIANGLES, MAX_VERTICES};
 
 /// The way in which a mesh breaks the input contract.
+///
+/// ```
+/// use bvh_bake::mesh::{InputError, Mesh};
+///
+/// let two_corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+/// let found = Mesh::from_triangles(two_corners, vec![[0, 1, 2]]).check();
+/// assert!(matches!(found, Err(InputError::Index { triangle: 0, vertices: 2, found: 2, .. })));
+/// assert_eq!(Mesh::default().check(), Err(InputError::Empty));
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {

@@ -14,6 +14,16 @@ use bvh_format::open_edges::OpenEdges;
 use std::path::PathBuf;
 
 /// The reason why a bake failed. The output's name still has its old content, if it had any.
+///
+/// ```
+/// use bvh_bake::{BakeError, FileBake, Options, shapes, to_bytes};
+///
+/// let missing = FileBake::new(["nowhere.obj"], "nowhere.cbvh").run();
+/// assert!(matches!(missing, Err(BakeError::Read(_))));
+/// let sheet = bvh_bake::mesh::Mesh::from_triangles(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+/// let Err(BakeError::NotClosed { edges, .. }) = to_bytes(&sheet, &Options::default().solid(true)) else { panic!() };
+/// assert_eq!(edges.count(), 3);
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BakeError {
@@ -133,6 +143,15 @@ pub enum BakeError {
 }
 
 /// The limit of the format that a mesh exceeds.
+///
+/// No mesh of ordinary size comes near these limits:
+///
+/// ```
+/// use bvh_bake::{BakeError, LimitError};
+///
+/// let error = BakeError::from(LimitError::Pages);
+/// assert_eq!(error.to_string(), "the mesh needs more than 2^26 pages");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LimitError {

@@ -10,6 +10,14 @@ use std::path::{Path, PathBuf};
 const EXCERPT_BYTES: usize = 60;
 
 /// The reason why a mesh file could not be read. The message is one line that names the file and the place.
+///
+/// ```
+/// use bvh_bake::input::{MeshFormat, Place, ReadError, read_bytes};
+///
+/// let found = read_bytes(b"v 0 0 zero\n", MeshFormat::Obj, "part.obj".as_ref()).unwrap_err();
+/// assert!(matches!(found, ReadError::Invalid { place: Place::Line(1), .. }));
+/// println!("{found}");
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
@@ -56,6 +64,8 @@ pub enum ReadError {
 }
 
 /// A place in a file.
+///
+/// [`ReadError`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// A line, counted from 1.

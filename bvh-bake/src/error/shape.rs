@@ -1,6 +1,13 @@
 //! Why a simple shape cannot be made.
 
 /// Why a function of [`shapes`](crate::shapes) makes no mesh.
+///
+/// ```
+/// use bvh_bake::{ShapeError, shapes};
+///
+/// assert_eq!(shapes::block([2.0, 0.0, 2.0]), Err(ShapeError::Length { name: "side", found: 0.0 }));
+/// assert_eq!(shapes::ground([f64::INFINITY; 2], 1.0), Err(ShapeError::HalfSpace("side")));
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeError {

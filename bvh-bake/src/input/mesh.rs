@@ -16,6 +16,16 @@ use std::collections::{HashMap, HashSet};
 const MAX_INSTANCES: u64 = u32::MAX as u64;
 
 /// The content of a mesh file: one object or several.
+///
+/// ```
+/// use bvh_bake::mesh::Mesh;
+///
+/// let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// let square = Mesh::from_triangles(corners, vec![[0, 1, 2], [0, 2, 3]]);
+/// square.check()?;
+/// assert_eq!((square.triangle_count(), square.vertex_count()), (2, 4));
+/// # Ok::<(), bvh_bake::mesh::InputError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// The objects, in the order of the file.
@@ -29,6 +39,19 @@ pub struct Mesh {
 }
 
 /// A named set of triangles.
+///
+/// ```
+/// use bvh_bake::mesh::{Mesh, Object};
+/// use bvh_bake::{Options, to_bytes};
+///
+/// let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let left = Object { name: "left".into(), positions, triangles: vec![[0, 1, 2]], triangle_ids: vec![0] };
+/// let right = Object { name: "right".into(), triangle_ids: vec![1], ..left.clone() };
+/// let mesh = Mesh { objects: vec![left, right], ..Mesh::default() };
+/// let (_, report) = to_bytes(&mesh, &Options::default().split_objects(true))?;
+/// assert_eq!(report.file.objects, 2); // otherwise, both are one
+/// # Ok::<(), bvh_bake::BakeError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Object {
     /// The name, which may be empty.

@@ -52,6 +52,14 @@ use std::sync::OnceLock;
 use std::thread;
 
 /// A format of mesh files, or of files of points. A point becomes a triangle whose corners are equal.
+///
+/// ```
+/// use bvh_bake::MeshFormat;
+///
+/// assert_eq!(MeshFormat::from_extension("part.STL".as_ref()), Some(MeshFormat::Stl));
+/// assert_eq!(MeshFormat::from_content(b"ply\nformat ascii 1.0\n"), Some(MeshFormat::Ply));
+/// assert!(MeshFormat::of_file("photo.jpeg".as_ref(), b"\xff\xd8\xff").is_err());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum MeshFormat {

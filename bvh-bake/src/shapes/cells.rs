@@ -13,6 +13,16 @@ use std::collections::{HashMap, HashSet};
 type Place = [i64; 3];
 
 /// A full cell of an octree.
+///
+/// ```
+/// use bvh_bake::shapes::{OctreeCell, octree};
+///
+/// // A cube with sides of two of the finest cells, and one of these beside it.
+/// let cells = [OctreeCell { corner: [0, 0, 0], size: 2 }, OctreeCell { corner: [2, 0, 0], size: 1 }];
+/// let surface = octree(&cells, 0.5)?;
+/// assert!(surface.objects[0].positions.contains(&[1.5, 0.0, 0.0]));
+/// # Ok::<(), bvh_bake::ShapeError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OctreeCell {
     /// The corner with the least coordinates, in sides of the finest cells: multiples of `size`.

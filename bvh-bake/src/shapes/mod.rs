@@ -87,6 +87,16 @@ fn between(lo: [f64; 3], hi: [f64; 3]) -> Mesh {
 }
 
 /// A polyhedron around a round shape.
+///
+/// ```
+/// use bvh_bake::shapes::{Circumscribed, cylinder};
+///
+/// let Circumscribed { mesh, error } = cylinder(0.5, 2.0, 0.01)?;
+/// assert!(error <= 0.01 * (1.0 + 1e-9));
+/// let from_the_axis = |[x, y, _]: &[f64; 3]| (x * x + y * y).sqrt();
+/// assert!(mesh.objects[0].positions.iter().all(|corner| (0.5..=0.511).contains(&from_the_axis(corner))));
+/// # Ok::<(), bvh_bake::ShapeError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Circumscribed {
     /// The polyhedron, which contains the shape.

@@ -18,6 +18,19 @@ use std::path::{Path, PathBuf};
 const PIECE_BYTES: u64 = 3;
 
 /// An opened file, of which nothing has been read yet.
+///
+/// ```
+/// use bvh_bake::{FileError, Layout, StoredFile, validate_in_parallel};
+///
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-scene.cbvh");
+/// let file = StoredFile::open(path.as_ref(), Some(64 << 20))?;
+/// let layout: Layout = validate_in_parallel(&file)?;
+/// assert_eq!(layout.objects.len(), 1);
+///
+/// let missing = StoredFile::open("nowhere.cbvh".as_ref(), None);
+/// assert!(matches!(missing, Err(FileError::Io { .. })));
+/// # Ok::<(), FileError>(())
+/// ```
 #[derive(Debug)]
 pub struct StoredFile {
     file: File,
@@ -27,6 +40,8 @@ pub struct StoredFile {
 }
 
 /// The reason why a file could not be read, or what is wrong with it.
+///
+/// [`StoredFile`] has an example.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {

@@ -38,6 +38,8 @@ use surfaces::Surfaces;
 use welded::WeldedInput;
 
 /// The figures of a successful verification.
+///
+/// [`verify`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VerifyReport {
     /// The number of stored triangles, each of which equals one of the mesh.
@@ -56,6 +58,8 @@ pub struct VerifyReport {
 }
 
 /// The reason why a file is not a faithful bake of a mesh.
+///
+/// [`verify`] has an example.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VerifyError {
@@ -110,6 +114,19 @@ impl VerifyError {
 /// Cost: about that of reading the mesh. Memory: 104 bytes per triangle of the mesh; in addition, 64 bytes per stored
 /// triangle with ids, or 48 bytes per triangle of mesh and file without ids. [`verify_files`] accepts a memory limit.
 ///
+/// ```
+/// use bvh_bake::{Options, VerifyError, VerifyReport, shapes, to_bytes, verify};
+///
+/// let block = shapes::block([2.0, 2.0, 2.0])?;
+/// let (bytes, _) = to_bytes(&block, &Options::default())?;
+/// let VerifyReport { triangles, by_id, max_move, .. } = verify(&bytes, &block)?;
+/// assert_eq!((triangles, by_id, max_move), (12, true, 0.0));
+///
+/// let other = shapes::block([2.0, 2.0, 3.0])?;
+/// assert!(matches!(verify(&bytes, &other), Err(VerifyError::Differs { .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Returns the first difference or broken rule that was found.
 pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
@@ -120,6 +137,21 @@ pub fn verify(bytes: &[u8], mesh: &Mesh) -> Result<VerifyReport, VerifyError> {
 }
 
 /// Options of [`verify_files`].
+///
+/// ```
+/// use bvh_bake::{FileBake, VerifyOptions, verify_files};
+///
+/// # let folder = std::env::temp_dir().join(format!("cbvh-verify-options-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// # let output = folder.join("robot.cbvh");
+/// # let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/fclrob.obj");
+/// FileBake::new([mesh], &output).run()?;
+/// let options = VerifyOptions::default().max_memory(256 << 20);
+/// let report = verify_files(&output, &[mesh.into()], &options)?;
+/// assert_eq!(report.triangles, 216);
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct VerifyOptions {

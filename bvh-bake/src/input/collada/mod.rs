@@ -30,6 +30,16 @@ use std::collections::HashMap;
 use transform::Transform;
 
 /// What to do with the axis that a COLLADA file declares to point up.
+///
+/// ```
+/// use bvh_bake::input::{UpAxis, read_with};
+///
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/collada/centimetres.dae");
+/// let turned = read_with(path.as_ref(), UpAxis::Turned, false)?;
+/// let kept = read_with(path.as_ref(), UpAxis::Kept, false)?;
+/// assert_eq!(turned.triangle_count(), kept.triangle_count());
+/// # Ok::<(), bvh_bake::ReadError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum UpAxis {
     /// Turn the file so that this axis becomes z. A file that declares none has y up, as the specification says.

@@ -18,6 +18,47 @@ use std::ops::Range;
 const MAX_MESSAGE: usize = 200;
 
 /// The elements and attributes that a program knows.
+///
+/// ```
+/// use bvh_bake::input::xml::{Schema, Tree, XmlError};
+///
+/// /// Points, as in `<points><point x="1"/></points>`.
+/// struct Points;
+///
+/// #[derive(Clone, Copy, PartialEq, Eq)]
+/// enum Tag {
+///     Points,
+///     Point,
+/// }
+///
+/// impl Schema for Points {
+///     type Tag = Tag;
+///     type Attribute = ();
+///
+///     const ROOT: &'static str = "points";
+///
+///     fn root() -> Tag {
+///         Tag::Points
+///     }
+///
+///     fn tag(parent: Tag, name: &str) -> Option<Tag> {
+///         (parent == Tag::Points && name == "point").then_some(Tag::Point)
+///     }
+///
+///     fn attribute(name: &str) -> Option<()> {
+///         (name == "x").then_some(())
+///     }
+/// }
+///
+/// let tree = Tree::<Points>::parse("<points>\n<note/><point x=\"1\"/>\n<point x=\"2\"/></points>")?;
+/// let values: Vec<_> = tree.children(Tree::<Points>::ROOT).map(|point| tree.attribute(point, ())).collect();
+/// assert_eq!(values, [Some("1"), Some("2")]); // the note is passed over
+/// assert_eq!(tree.line(2), 3);
+///
+/// let other: Result<_, XmlError> = Tree::<Points>::parse("<lines/>");
+/// assert_eq!(other.err().map(|error| (error.line, error.column)), Some((1, 1)));
+/// # Ok::<(), XmlError>(())
+/// ```
 pub trait Schema {
     /// An element.
     type Tag: Copy + Eq;
@@ -48,6 +89,8 @@ pub trait Schema {
 }
 
 /// Why a text is no document of a schema.
+///
+/// [`Schema`] has an example.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct XmlError {
     /// The line, counted from 1.
@@ -81,6 +124,8 @@ pub(crate) struct Element<Tag> {
 }
 
 /// The elements of a text that a schema knows.
+///
+/// [`Schema`] has an example.
 pub struct Tree<'a, S: Schema> {
     text: &'a str,
     elements: Vec<Element<S::Tag>>,
@@ -329,6 +374,8 @@ fn whole_words(message: &str) -> String {
 }
 
 /// The elements directly in an element.
+///
+/// [`Schema`] has an example.
 pub struct Children<'d, 'a, S: Schema> {
     tree: &'d Tree<'a, S>,
     next: Number,
