@@ -7,6 +7,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Why a file cannot be opened.
+///
+/// ```
+/// use bvh_query::{Bvh, OpenError};
+///
+/// match Bvh::read("nowhere.cbvh") {
+///     Err(OpenError::Io { path, source }) => println!("{}: {source}", path.display()),
+///     Err(OpenError::Format { source, .. }) => panic!("rule {} is broken", source.rule),
+///     opened => panic!("{opened:?}"),
+/// }
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpenError {
@@ -29,6 +39,17 @@ pub enum OpenError {
 }
 
 /// Why a query has no answer. Geometry is never the reason: it is a damaged file, a budget, a stop or an invalid number.
+///
+/// ```
+/// use bvh_query::{Pose, Querier, QueryError};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut querier = Querier::new()?;
+/// querier.set_budget(1);
+/// let found = querier.distance(&block, &block, &Pose::IDENTITY);
+/// assert_eq!(found, Err(QueryError::Budget { visits: 1 }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QueryError {
@@ -78,6 +99,16 @@ fn explained(edges: &Option<Arc<OpenEdges>>) -> String {
 }
 
 /// An invalid number, by the parameter that it was given for.
+///
+/// ```
+/// use bvh_query::{NumberError, Pose, Querier, QueryError};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let found = Querier::new()?.within(&block, &block, &Pose::IDENTITY, -1.0);
+/// assert_eq!(found, Err(QueryError::Number(NumberError::Distance(-1.0))));
+/// assert!(found.unwrap_err().to_string().starts_with("d: expected a finite distance of at least 0, found -1"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumberError {
@@ -136,6 +167,22 @@ pub enum NumberError {
 }
 
 /// What became of a file after its header was read.
+///
+/// ```
+/// use bvh_query::{FileChange, Files, Pose, QueryError, Scene, SceneError};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// # let path = std::env::temp_dir().join(format!("cbvh-file-change-{}.cbvh", std::process::id()));
+/// # std::fs::write(&path, block.bytes())?;
+/// let shape = Files::new(8).shape(&path)?; // reads the header and closes the file
+/// std::fs::remove_file(&path)?;
+/// let mut scene = Scene::new()?;
+/// scene.add(shape.clone(), Pose::IDENTITY)?;
+/// scene.add(shape, Pose::IDENTITY)?;
+/// let Err(SceneError::Pair { source: QueryError::File { found, .. }, .. }) = scene.collide() else { panic!() };
+/// assert_eq!(found, FileChange::Unreadable(std::io::ErrorKind::NotFound));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileChange {

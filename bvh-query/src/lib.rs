@@ -142,6 +142,14 @@ pub use stop::Stop;
 /// The path is written as for `include_bytes!`. For a file that a build script baked, it is
 /// `concat!(env!("OUT_DIR"), "/name.cbvh")`. The file starts at a cache line, so that queries read plain triangles in
 /// place.
+///
+/// ```
+/// use bvh_query::{Bvh, include_cbvh};
+///
+/// let bvh: Bvh = include_cbvh!(concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-scene.cbvh"))?;
+/// assert!(!bvh.objects().is_empty());
+/// # Ok::<(), bvh_query::FormatError>(())
+/// ```
 #[macro_export]
 macro_rules! include_cbvh {
     ($path:expr $(,)?) => {

@@ -32,6 +32,20 @@ use std::sync::{Arc, Mutex, OnceLock, Weak};
 /// some KiB, whatever numbers the file holds; from the first ray or segment on, 24 bytes per object more. Once these have visited as
 /// many nodes of an object as it has, the file keeps a tree of boxes for them, of up to 16 bytes per triangle or 16 KiB. Making the tree
 /// reads the whole object, also of a file that is mapped with [`ReadAhead::Sparse`](crate::ReadAhead::Sparse).
+///
+/// ```
+/// use bvh_bake::{Options, shapes, to_bytes};
+/// use bvh_query::Bvh;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let (bytes, _report) = to_bytes(&shapes::block([2.0, 2.0, 2.0])?, &Options::default())?;
+/// let block = Bvh::from_bytes(bytes)?; // Bvh::read and Bvh::map open a file on a disk
+/// assert_eq!(block.objects().len(), 1);
+/// assert_eq!(block.objects()[0].triangles(), 12);
+/// assert!(block.is_closed(0)?);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Bvh(Arc<OpenFile>);
 

@@ -57,6 +57,18 @@ struct Known {
 
 /// A shape in a scene. Either its file is open as long as the shape lives, or [`Files`] opens it only while a question
 /// needs it. Every shape whose file is open converts into one.
+///
+/// ```
+/// use bvh_query::{Pose, Scene, SceneShape};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let rounded = SceneShape::from(block.clone()).rounded(0.25)?;
+/// assert_eq!(rounded.radius(), 0.25);
+/// let mut scene = Scene::new()?;
+/// scene.add(rounded, Pose::IDENTITY)?;
+/// scene.add(block, Pose::IDENTITY)?; // converts into a shape
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct SceneShape {
     file: Held,

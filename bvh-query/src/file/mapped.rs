@@ -13,6 +13,16 @@ use std::path::Path;
 /// How the system reads a mapped file from its disk.
 ///
 /// This is a hint; without it, the system guesses. On systems other than Unix all hints are the same.
+///
+/// ```
+/// use bvh_query::{Bvh, ReadAhead};
+///
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../testdata/ok-scene.cbvh");
+/// // SAFETY: nobody changes the file while the program runs.
+/// let bvh = unsafe { Bvh::map_with(path, ReadAhead::Sparse) }?;
+/// assert!(!bvh.objects().is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum ReadAhead {

@@ -26,6 +26,19 @@ impl Bvh {
 /// One side of a question, borrowed from its file: one object, or all objects as one. A `&Bvh` converts into the shape
 /// of all its objects.
 ///
+/// ```
+/// use bvh_query::{Pose, Querier, Shape};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// # let small = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([1.0; 3])?, &Default::default())?.0)?;
+/// let mut querier = Querier::new()?;
+/// let shape: Shape<'_> = block.all(); // or one object: block.object(0)
+/// assert!(!querier.collide(shape, &small, &Pose::IDENTITY)?); // inside, and no surfaces meet
+/// assert!(querier.collide(shape.solid()?, &small, &Pose::IDENTITY)?);
+/// assert_eq!(querier.distance(shape.rounded(0.25)?, &small, &Pose::IDENTITY)?.distance, 0.25);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Rounded shapes
 /// A shape is a core and a radius: all points at most that far from the triangles of the core. Any mesh may be the core. A
 /// triangle whose corners are equal is a point and makes a ball; a triangle whose corners lie on a line is a segment and makes

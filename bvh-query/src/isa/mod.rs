@@ -301,6 +301,16 @@ pub(crate) trait Task {
 }
 
 /// A vector backend.
+///
+/// ```
+/// use bvh_query::{Backend, Querier};
+///
+/// let available = Backend::ALL.into_iter().filter(|backend| backend.is_available());
+/// for backend in available {
+///     println!("{backend}"); // scalar, avx2
+///     assert_eq!(Querier::with_backend(backend).backend(), backend);
+/// }
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Backend {
@@ -406,6 +416,15 @@ impl fmt::Display for Backend {
 }
 
 /// Why a backend is not available.
+///
+/// ```
+/// use bvh_query::{Backend, BackendError};
+///
+/// assert_eq!(Backend::from_name("sse9"), Err(BackendError::Unknown("sse9".to_owned())));
+/// for backend in Backend::ALL.into_iter().filter(|backend| !backend.is_available()) {
+///     assert_eq!(Backend::from_name(backend.name()), Err(BackendError::Missing(backend)));
+/// }
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BackendError {

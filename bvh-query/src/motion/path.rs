@@ -9,6 +9,29 @@ use bvh_format::object::MAX_COORDINATE;
 /// A motion of B in A's frame, over times from 0 to 1.
 ///
 /// [`Motion`] and [`Polyline`](crate::Polyline) are paths. Implement it for others, such as a link of a robot whose joints move.
+///
+/// ```
+/// use bvh_query::{MotionAnswer, MotionOptions, Pose, Querier, RigidPath};
+///
+/// /// Falls from rest, by 3 units until time 1.
+/// struct Fall;
+///
+/// impl RigidPath for Fall {
+///     fn pose(&self, t: f64) -> Pose {
+///         Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, 4.0 - 3.0 * t * t]).expect("a valid pose")
+///     }
+///
+///     fn sagitta(&self, _radius: f64, t0: f64, t1: f64) -> f64 {
+///         6.0 / 8.0 * (t1 - t0).powi(2) + 1e-14 // the acceleration is 6; the rest is for roundings
+///     }
+/// }
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let answer = Querier::new()?.motion(&block, &block, &Fall, &MotionOptions::new())?;
+/// let MotionAnswer::Hit { free_until, touching_at, .. } = answer else { panic!("{answer:?}") };
+/// let exact = (2.0_f64 / 3.0).sqrt();
+/// assert!(free_until <= exact && exact - 1e-12 <= touching_at && touching_at - free_until < 1e-5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait RigidPath {
     /// Returns where B is at a time from 0 to 1. The same time must always give the same pose, to the bit.
     fn pose(&self, t: f64) -> Pose;
@@ -59,6 +82,21 @@ const MIN_HALF_COSINE: f64 = 1e-9;
 
 /// A rotation at a constant rate about an axis of A's frame, with a translation at a constant rate: [`Motion::between`] two
 /// poses, or a [`Motion::screw`].
+///
+/// ```
+/// use bvh_query::{Motion, Pose, RigidPath};
+///
+/// let start = Pose::new(*Pose::IDENTITY.rotation(), [2.0, 0.0, 0.0])?;
+/// let end = Pose::new([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 2.0, 0.0])?;
+/// let motion = Motion::between(&start, &end)?;
+/// assert_eq!(motion.pose(0.5).translation(), [1.0, 1.0, 0.0]); // the origin moves on a line
+/// assert!((motion.angle().to_degrees() - 90.0).abs() < 1e-12);
+///
+/// let turn = Motion::screw(&start, [0.0; 3], [0.0, 0.0, 1.0], motion.angle(), 0.0)?;
+/// let [x, y, _] = turn.pose(0.5).translation();
+/// assert!((x * x + y * y - 4.0).abs() < 1e-12); // here it stays on a circle
+/// # Ok::<(), bvh_query::PoseError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     pub(super) start: Pose,

@@ -5,6 +5,16 @@ use crate::numerics::SLACK;
 use crate::pose::{Pose, PoseError};
 
 /// A path through several poses. The motion from each pose to the next takes the same share of the time.
+///
+/// ```
+/// use bvh_query::{Polyline, Pose, RigidPath};
+///
+/// let at = |x, y| Pose::new(*Pose::IDENTITY.rotation(), [x, y, 0.0]);
+/// let path = Polyline::new(&[at(0.0, 0.0)?, at(4.0, 0.0)?, at(4.0, 2.0)?])?;
+/// assert_eq!(path.pose(0.25).translation(), [2.0, 0.0, 0.0]);
+/// assert_eq!(path.pose(0.75).translation(), [4.0, 1.0, 0.0]);
+/// # Ok::<(), bvh_query::PoseError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
     motions: Vec<Motion>,

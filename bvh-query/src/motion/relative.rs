@@ -13,6 +13,17 @@ use bvh_format::object::MAX_COORDINATE;
 /// there is always a relative pose. At a time without one, B counts as farther away than any mesh, and the sagitta of an
 /// interval that begins or ends there as infinite: neither a hit nor free. A question about such a path is refused with
 /// [`NumberError::Unresolved`](crate::NumberError::Unresolved), unless it finds a hit before.
+///
+/// ```
+/// use bvh_query::{Motion, Pose, RelativePath, RigidPath};
+///
+/// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+/// let slow = Motion::between(&at(0.0)?, &at(1.0)?)?;
+/// let fast = Motion::between(&at(2.0)?, &at(6.0)?)?;
+/// let path = RelativePath::new(&slow, &fast);
+/// assert_eq!(path.pose(1.0).translation(), [5.0, 0.0, 0.0]);
+/// # Ok::<(), bvh_query::PoseError>(())
+/// ```
 #[derive(Clone, Copy)]
 pub struct RelativePath<'a> {
     a: &'a dyn RigidPath,

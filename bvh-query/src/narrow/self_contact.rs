@@ -15,6 +15,8 @@ use super::{Point, Triangle, segment_intersects, triangles_intersect};
 
 /// How two triangles of one mesh meet, by the corners that they have in common. The command and the bindings of other
 /// languages use its numbers: `kind as u8`.
+///
+/// [`Querier::self_contacts`](crate::Querier::self_contacts) has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]

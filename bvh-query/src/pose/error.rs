@@ -1,6 +1,15 @@
 //! Why a matrix, a quaternion or a composition is no rigid pose, and why poses or numbers make no path.
 
 /// Why a matrix is not a rigid placement, why an instance of a scene cannot have a pose, or why poses or numbers make no path.
+///
+/// ```
+/// use bvh_query::{Pose, PoseError};
+///
+/// let doubled = [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+/// assert_eq!(Pose::new(doubled, [0.0; 3]), Err(PoseError::Scaled(2.0)));
+/// let mirrored = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// assert_eq!(Pose::new(mirrored, [0.0; 3]), Err(PoseError::Reflection));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {

@@ -29,6 +29,18 @@ impl Querier {
     /// counts as collision. Meshes are surfaces: a mesh wholly inside another one, without touching it, does not
     /// collide with it, unless the outer one is solid ([`Shape::solid`]). [`Querier::relation`] finds such a mesh.
     ///
+    /// ```
+    /// use bvh_query::{Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// // Both are 2 wide.
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// assert!(querier.collide(&block, &block, &at(2.0)?)?); // their faces touch
+    /// assert!(!querier.collide(&block, &block, &at(2.0_f64.next_up())?)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
     /// suffice.

@@ -23,6 +23,8 @@ use std::ops::ControlFlow;
 pub(super) type Report<'a> = &'a mut dyn FnMut(Contact, TrianglePair) -> ControlFlow<()>;
 
 /// A pair of triangles in contact.
+///
+/// [`Querier::contacts`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contact {
@@ -44,6 +46,22 @@ impl Querier {
     /// duplicate that the baker left out is in contact wherever the triangle that replaces it is. Each contact counts
     /// as a visit ([`Querier::set_budget`]).
     ///
+    /// ```
+    /// use bvh_query::{Contact, Pose, Querier};
+    ///
+    /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+    /// # let triangle = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &Default::default())?.0)?;
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let contacts = querier.contacts(&triangle, &triangle, &Pose::IDENTITY)?;
+    /// assert_eq!(contacts, [Contact { object_a: 0, triangle_a: 0, object_b: 0, triangle_b: 0 }]);
+    /// // An edge of the triangle lies on the face of the block that is at x = 0.
+    /// let contacts = querier.contacts(&triangle, &block, &Pose::new(*Pose::IDENTITY.rotation(), [-1.0, 0.0, 0.0])?)?;
+    /// assert!(!contacts.is_empty() && contacts.iter().all(|contact| contact.triangle_a == 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
     /// suffice.
@@ -64,6 +82,20 @@ impl Querier {
 
     /// Calls `visit` once for each pair of triangles in contact, in no particular order, until it breaks. Returns the
     /// number of calls.
+    ///
+    /// ```
+    /// use bvh_query::{Pose, Querier};
+    /// use std::ops::ControlFlow;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut some = Vec::new();
+    /// let calls = Querier::new()?.visit_contacts(&block, &block, &Pose::IDENTITY, |contact| {
+    ///     some.push(contact);
+    ///     if some.len() == 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    /// })?;
+    /// assert_eq!(calls, 5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::contacts`].

@@ -21,6 +21,17 @@ fn half_sides(object: &Object) -> [f64; 3] {
 /// below [`Distance::lower`](crate::Distance::lower) of the first pose, the meshes do not touch in the second. One
 /// answer about a distance therefore shows how far B may move or turn. The bound is about the two poses and not about
 /// the path between them: see [`path_reach`](crate::path_reach).
+///
+/// ```
+/// use bvh_query::{Pose, Querier, displacement};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+/// let (from, to) = (at(3.0)?, at(2.5)?);
+/// let gap = Querier::new()?.distance(&block, &block, &from)?.lower;
+/// assert!(displacement(&block, &from, &to) < gap); // so they do not touch there either
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn displacement<'a>(b: impl Into<Shape<'a>>, from: &Pose, to: &Pose) -> f64 {
     // A vertex is at most the half sides h of its object's box away from the centre c of it, so that along axis i it
     // moves by at most |dR_i c + dt_i| + |dR_i| h, where dR and dt are the changes of rotation and translation.

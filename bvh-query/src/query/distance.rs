@@ -17,6 +17,8 @@ use crate::query::stats::QueryStats;
 
 /// The least distance of two shapes. For shapes with radii, `triangle_a` and `triangle_b` are those of the cores, and the points
 /// are on the rounded surfaces; where the shapes touch, both are one common point.
+///
+/// [`Querier::distance`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -69,6 +71,22 @@ impl Querier {
     /// The distance is that of the triangles on the placed vertices, to within a few roundings of f64 at the scale of the
     /// two closest triangles. It has the same bits on all backends.
     ///
+    /// ```
+    /// use bvh_query::{Distance, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+    /// # let triangle = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &Default::default())?.0)?;
+    /// let above = Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, 1.5])?;
+    /// let Distance { distance, lower, upper, point_a, point_b, triangle_b, .. } =
+    ///     Querier::new()?.distance(&block, &triangle, &above)?;
+    /// assert_eq!((distance, triangle_b), (0.5, 0));
+    /// assert!(lower <= distance && distance <= upper);
+    /// assert_eq!((point_a[2], point_b[2]), (1.0, 1.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page that the query touches is damaged, [`QueryError::Budget`] if the budget does not
     /// suffice.
@@ -95,6 +113,17 @@ impl Querier {
 
     /// Returns a distance that may exceed the least one by an allowed error, which saves time. `lower` is the bound
     /// that was proved. Different backends may return different allowed answers.
+    ///
+    /// ```
+    /// use bvh_query::{DistanceOptions, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let beside = Pose::new(*Pose::IDENTITY.rotation(), [2.5, 0.0, 0.0])?;
+    /// let within_a_tenth = DistanceOptions::new().rel_err(0.1);
+    /// let found = Querier::new()?.distance_with(&block, &block, &beside, &within_a_tenth)?;
+    /// assert!(found.lower <= 0.5 && 0.5 <= found.upper && found.distance <= 0.55);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if an allowed error is negative, NaN or infinite; else the errors of
@@ -224,6 +253,17 @@ impl Querier {
     ///
     /// The answer is exact, also if `d` is between the bounds of [`Querier::distance`]. Integers of any length decide
     /// such a case; a warm query allocates nothing else.
+    ///
+    /// ```
+    /// use bvh_query::{Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let beside = Pose::new(*Pose::IDENTITY.rotation(), [2.5, 0.0, 0.0])?;
+    /// assert!(querier.within(&block, &block, &beside, 0.5)?);
+    /// assert!(!querier.within(&block, &block, &beside, 0.5_f64.next_down())?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if `d` is negative, NaN or infinite; else the errors of [`Querier::distance`].

@@ -21,6 +21,19 @@ use std::sync::Arc;
 /// need, a query allocates nothing. A querier keeps some decoded treelets from one query to the next, which does not
 /// affect answers. Use one querier per thread.
 ///
+/// ```
+/// use bvh_query::{Pose, Querier};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut querier = Querier::new()?;
+/// for step in 0..4 {
+///     let pose = Pose::new(*Pose::IDENTITY.rotation(), [f64::from(step), 0.0, 0.0])?;
+///     assert_eq!(querier.collide(&block, &block, &pose)?, step <= 2); // the blocks are 2 wide
+/// }
+/// println!("{}, {:?}", querier.backend(), querier.stats());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Worst case
 /// These bounds hold for files of any bytes, forged ones included. Each pair of objects is walked once; a distance of 0, or
 /// one near the sum of two radii, takes a second walk. Let the pages of the two objects have t and u treelets, and p and q leaf packets.

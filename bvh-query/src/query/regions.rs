@@ -12,6 +12,8 @@ use crate::query::rounded::{between, sum_of_radii};
 use std::ops::ControlFlow;
 
 /// What two triangles have in common. The bindings of other languages use its numbers: `kind as u8`.
+///
+/// [`Querier::contact_regions`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum RegionKind {
@@ -24,6 +26,8 @@ pub enum RegionKind {
 }
 
 /// Where two triangles in contact meet, in A's frame and in mesh units.
+///
+/// [`Querier::contact_regions`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ContactRegion {
@@ -60,7 +64,7 @@ impl ContactRegion {
     }
 }
 
-/// The answer of [`Querier::contact_regions`].
+/// The answer of [`Querier::contact_regions`], which has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct ContactRegions {
@@ -90,6 +94,24 @@ impl Querier {
     /// Cost: that of [`Querier::contacts`], some 40 bytes for each contact while it runs, and some 0.3 us for each region; some
     /// microseconds where triangles are almost in one plane. Each contact counts as a visit ([`Querier::set_budget`]). The
     /// method is that of P. Guigue and O. Devillers (2003); `spec/numerics.md` derives the error.
+    ///
+    /// ```
+    /// use bvh_query::{ContactRegion, Pose, Querier, RegionKind};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners, vec![[0, 1, 2]]);
+    /// # let triangle = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &Default::default())?.0)?;
+    /// // The triangle lies in the plane z = 0, and its right angle is at x = 0.5 in the block.
+    /// let across = Pose::new(*Pose::IDENTITY.rotation(), [0.5, 0.25, 0.0])?;
+    /// let found = Querier::new()?.contact_regions(&block, &triangle, &across, usize::MAX)?;
+    /// assert_eq!(found.total, found.regions.len() as u64);
+    /// for region in &found.regions {
+    ///     assert_eq!(region.kind, RegionKind::Segment);
+    ///     assert!(region.points().iter().all(|point| point[0] == 1.0 || point[1] == 1.0));
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::contacts`].

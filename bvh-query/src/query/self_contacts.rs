@@ -17,8 +17,8 @@ use bvh_format::object::Object;
 use bvh_format::validate::packets;
 use std::ops::ControlFlow;
 
-/// Two triangles of one mesh that meet where they should not: see [`Querier::self_contacts`](crate::Querier::self_contacts).
-/// The object and the triangle of A are before those of B.
+/// Two triangles of one mesh that meet where they should not: see [`Querier::self_contacts`](crate::Querier::self_contacts),
+/// which has an example. The object and the triangle of A are before those of B.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SelfContact {
@@ -55,6 +55,19 @@ impl Querier {
     /// to 25 bytes per triangle, and 20 per contact. Each leaf packet, each pair of nodes or of leaf packets whose boxes
     /// overlap and each contact counts as a visit ([`Querier::set_budget`]).
     ///
+    /// ```
+    /// use bvh_query::{Querier, SelfContact, SelfContactKind};
+    ///
+    /// # let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [9.0, 9.0, 0.0]];
+    /// # let mesh = bvh_bake::mesh::Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2], [3, 4, 5]]);
+    /// # let mesh = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&mesh, &Default::default())?.0)?;
+    /// // A mesh of two triangles, the second of which crosses the first.
+    /// let found = Querier::new()?.self_contacts(&mesh)?;
+    /// let [SelfContact { triangle_a: 0, triangle_b: 1, kind, .. }] = found[..] else { panic!("{found:?}") };
+    /// assert_eq!(kind, SelfContactKind::Crossing);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Damaged`] if a page of the shape is damaged, [`QueryError::Budget`] if the budget does not suffice.
     pub fn self_contacts<'a>(&mut self, shape: impl Into<Shape<'a>>) -> Result<Vec<SelfContact>, QueryError> {
@@ -69,6 +82,16 @@ impl Querier {
 
     /// Calls `visit` once for each pair of triangles of a shape that meet where they should not, in no particular order, until
     /// it breaks. Returns the number of calls.
+    ///
+    /// ```
+    /// use bvh_query::Querier;
+    /// use std::ops::ControlFlow;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let calls = Querier::new()?.visit_self_contacts(&block, |_| ControlFlow::Break(()))?;
+    /// assert_eq!(calls, 0); // neighbours meet in their common edges alone
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::self_contacts`].

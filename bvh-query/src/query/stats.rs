@@ -1,6 +1,17 @@
 //! Counts the work of a query.
 
 /// The work of the last query.
+///
+/// ```
+/// use bvh_query::{Pose, Querier};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut querier = Querier::new()?;
+/// let far = Pose::new(*Pose::IDENTITY.rotation(), [100.0, 0.0, 0.0])?;
+/// assert!(!querier.collide(&block, &block, &far)?);
+/// assert_eq!(querier.stats().exact_tests, 0); // filters were enough
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

@@ -7,6 +7,17 @@ use crate::scene::instance::InstanceId;
 use std::fmt;
 
 /// The instance that an error is about. It is shown by its name or, without one, by its identifier.
+///
+/// ```
+/// use bvh_query::{Pose, Scene, SceneError};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut scene = Scene::new()?;
+/// let too_far = Pose::new(*Pose::IDENTITY.rotation(), [1e36, 0.0, 0.0])?;
+/// let Err(SceneError::Pose { instance, .. }) = scene.add_named("crate", block, too_far) else { panic!() };
+/// assert_eq!((instance.name.as_deref(), instance.to_string()), (Some("crate"), "crate".to_owned()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InstanceLabel {
     /// The identifier; for an instance that was refused, the one that it would have had.
@@ -25,6 +36,19 @@ impl fmt::Display for InstanceLabel {
 }
 
 /// Why a file makes no scene, why a scene refuses an instance or a change of it, or why a question about it has no answer.
+///
+/// ```
+/// use bvh_query::{Pose, Scene, SceneError};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut scene = Scene::new()?;
+/// let id = scene.add_named("crate", block.clone(), Pose::IDENTITY)?;
+/// let again = scene.add_named("crate", block, Pose::IDENTITY);
+/// assert_eq!(again, Err(SceneError::NameTaken("crate".to_owned())));
+/// scene.remove(id)?;
+/// assert_eq!(scene.pose(id), Err(SceneError::NoInstance(id)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {

@@ -12,6 +12,17 @@ use std::sync::Arc;
 /// Identifies an instance of a scene. A scene never gives an identifier twice, so a removed instance cannot be mistaken
 /// for a later one. Identifiers are ordered by the places of their instances. In a pair of instances, the lower one is
 /// A.
+///
+/// ```
+/// use bvh_query::{InstanceId, Pose, Scene};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut scene = Scene::new()?;
+/// let id = scene.add_named("crate", block, Pose::IDENTITY)?;
+/// assert_eq!(scene.find("crate"), Some(id));
+/// assert_eq!(InstanceId::from_bits(id.to_bits()), id); // as a number, for other languages
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct InstanceId {
     pub(super) place: u32,

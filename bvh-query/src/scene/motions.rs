@@ -27,6 +27,8 @@ const MOST_SLICES: usize = 16;
 
 /// Whether the motions of all moving instances are free. In the pairs named here, A is the instance that stands still
 /// or, if both move, the lower one.
+///
+/// [`Scene::motion`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SceneMotionAnswer {
     /// At no time from 0 to 1 is any pair within the clearance.
@@ -120,6 +122,22 @@ impl Scene {
     /// both instances of a pair turn, more intervals are needed than if one stands still, unless both follow the same
     /// instance: then a pair takes one query about contact.
     ///
+    /// ```
+    /// use bvh_query::{Motion, MotionOptions, SceneMotionAnswer, ScenePair};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let path = Motion::between(&at(0.0)?, &at(1.0)?)?;
+    /// let answer = scene.motion(&[(left, &path)], &MotionOptions::new())?;
+    /// let SceneMotionAnswer::Hit { free_until, touching_at, pair, .. } = answer else { panic!("{answer:?}") };
+    /// assert!(free_until <= 0.5 && 0.5 <= touching_at && touching_at - free_until < 1e-5);
+    /// assert_eq!(pair, ScenePair { a: right, b: left }); // A stands still
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError::NoInstance`] for an identifier of no instance, [`SceneError::Pose`] for a start or an end of a path that
     /// [`Scene::set_pose`] refuses; [`SceneError::Query`] for an invalid clearance or tolerance; and
@@ -152,6 +170,21 @@ impl Scene {
     /// Returns whether the motions are certainly free: whether [`Scene::motion`] would answer
     /// [`SceneMotionAnswer::Free`]. It takes less time than the full answer. Use it in planners. To check many edges on
     /// all cores, clone the scene for each thread.
+    ///
+    /// ```
+    /// use bvh_query::{Motion, MotionOptions};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let closer = Motion::between(&at(0.0)?, &at(1.0)?)?;
+    /// let away = Motion::between(&at(2.5)?, &at(3.5)?)?;
+    /// assert!(!scene.is_free(&[(left, &closer)], &MotionOptions::new())?);
+    /// assert!(scene.is_free(&[(left, &closer), (right, &away)], &MotionOptions::new())?); // at the same time
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Scene::motion`], unless another pair is found not to be free.

@@ -21,6 +21,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// A pair of instances. A is the lower one. In answers about motions ([`SceneMotionAnswer`](crate::SceneMotionAnswer)),
 /// A is the instance that stands still, if one does.
+///
+/// [`Scene::pairs_within`] has an example.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct ScenePair {
     /// The instance in whose frame answers are given.
@@ -30,6 +32,8 @@ pub struct ScenePair {
 }
 
 /// Two triangles in contact, and their instances.
+///
+/// [`Scene::contacts`] has an example.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[non_exhaustive]
 pub struct SceneContact {
@@ -41,6 +45,8 @@ pub struct SceneContact {
 
 /// The nearest pair of instances, and how far apart they are. Points are in A's frame;
 /// `scene.pose(pair.a)?.place(point)` returns a point in the world.
+///
+/// [`Scene::distance`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneDistance {
@@ -52,6 +58,8 @@ pub struct SceneDistance {
 
 /// A pair of instances that clash, and how. Points and translations are in A's frame, and the box of what they have in common is in that
 /// of the world.
+///
+/// [`Scene::clashes`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneClash {
@@ -123,6 +131,18 @@ impl NearPair {
 impl Scene {
     /// Returns whether any pair touches.
     ///
+    /// ```
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert!(!scene.collide()?);
+    /// scene.set_pose(right, at(2.0)?)?;
+    /// assert!(scene.collide()?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError::Pair`] with a pair whose question has no answer, because a page is damaged or the budget does not
     /// suffice, unless another pair is found to touch.
@@ -131,6 +151,16 @@ impl Scene {
     }
 
     /// Returns whether any pair is at most `d` apart, in mesh units.
+    ///
+    /// ```
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert!(scene.within(0.5)? && !scene.within(0.4)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::collide`].
@@ -141,6 +171,19 @@ impl Scene {
 
     /// Returns all pairs that touch.
     ///
+    /// ```
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert!(scene.pairs_in_contact()?.is_empty());
+    /// scene.set_pose(right, at(2.0)?)?;
+    /// let [pair] = scene.pairs_in_contact()?[..] else { panic!() };
+    /// assert_eq!((pair.a, pair.b), (left, right));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError::Pair`] with the first pair whose question has no answer.
     pub fn pairs_in_contact(&mut self) -> Result<Vec<ScenePair>, SceneError> {
@@ -148,6 +191,19 @@ impl Scene {
     }
 
     /// Returns all pairs that are at most `d` apart, in mesh units.
+    ///
+    /// ```
+    /// use bvh_query::ScenePair;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert_eq!(scene.pairs_within(0.5)?, [ScenePair { a: left, b: right }]);
+    /// assert_eq!(scene.pairs_within(0.4)?, []);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] if `d` is negative, NaN or infinite, and the errors of [`Scene::pairs_in_contact`].
@@ -159,6 +215,20 @@ impl Scene {
     /// Returns all pairs that touch, or of which one is inside the other, wholly or in part, with their relations.
     /// Pairs that have nothing in common are left out: those whose boxes in the world are apart, and those for which
     /// [`Querier::relation`] answers [`Relation::Apart`].
+    ///
+    /// ```
+    /// use bvh_query::{Relation, ScenePair};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert_eq!(scene.relations()?, []); // nothing in common
+    /// scene.set_pose(right, at(1.5)?)?;
+    /// assert_eq!(scene.relations()?, [(ScenePair { a: left, b: right }, Relation::Touching)]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
@@ -172,6 +242,22 @@ impl Scene {
     /// Returns all pairs that are near each other, touch, overlap, contain each other or are duplicates, with how they lie. Pairs
     /// that are apart are left out.
     ///
+    /// ```
+    /// use bvh_query::{ClashClass, ClashOptions, SceneClash};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert!(scene.clashes(&ClashOptions::new())?.is_empty());
+    /// let found = scene.clashes(&ClashOptions::new().clearance(0.5))?;
+    /// let [SceneClash { pair, clash, .. }] = found[..] else { panic!("{found:?}") };
+    /// assert_eq!((pair.a, pair.b), (left, right));
+    /// assert_eq!((clash.class, clash.distance), (ClashClass::Near, 0.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError::Query`] if an option is invalid, the errors of [`Scene::pairs_in_contact`], and of [`Querier::relation`].
     pub fn clashes(&mut self, options: &ClashOptions) -> Result<Vec<SceneClash>, SceneError> {
@@ -180,6 +266,20 @@ impl Scene {
 
     /// Returns the clashes of those pairs that `is_asked` accepts, as [`Scene::clashes`] does. Several machines can so share the
     /// pairs of one scene. Files of other pairs are not opened ([`Files`](crate::Files)).
+    ///
+    /// ```
+    /// use bvh_query::ClashOptions;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let options = ClashOptions::new().clearance(0.5);
+    /// let mut mine = |machine: u64| scene.clashes_among(&options, |pair| pair.a.to_bits() % 2 == machine);
+    /// assert_eq!((mine(0)?.len(), mine(1)?.len()), (1, 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Scene::clashes`].
@@ -212,6 +312,22 @@ impl Scene {
 
     /// Returns all pairs of triangles in contact.
     ///
+    /// ```
+    /// use bvh_query::SceneContact;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// scene.set_pose(right, at(2.0)?)?;
+    /// for SceneContact { pair, contact, .. } in scene.contacts()? {
+    ///     assert_eq!((pair.a, pair.b), (left, right));
+    ///     assert!(contact.triangle_a < 12 && contact.triangle_b < 12);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`].
     pub fn contacts(&mut self) -> Result<Vec<SceneContact>, SceneError> {
@@ -227,6 +343,25 @@ impl Scene {
 
     /// Calls `visit` with each pair of instances that touch and its pairs of triangles in contact, in ascending order of the
     /// pairs, until it breaks. At any time it holds the contacts of one pair, not of all. It uses one thread.
+    ///
+    /// ```
+    /// use std::ops::ControlFlow;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// scene.set_pose(right, at(2.0)?)?;
+    /// let mut most = 0;
+    /// scene.visit_contacts(|pair, contacts| {
+    ///     println!("instances {} and {}", pair.a, pair.b);
+    ///     most = most.max(contacts.len());
+    ///     ControlFlow::Continue(())
+    /// })?;
+    /// assert!(most > 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Scene::pairs_in_contact`].
@@ -249,6 +384,21 @@ impl Scene {
     }
 
     /// Returns the nearest pair and its distance; `None` if there are no pairs.
+    ///
+    /// ```
+    /// use bvh_query::SceneDistance;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let Some(SceneDistance { pair, nearest, .. }) = scene.distance()? else { panic!() };
+    /// assert_eq!((pair.a, pair.b, nearest.distance), (left, right, 0.5));
+    /// let in_the_world = scene.pose(pair.a)?.place(nearest.point_b);
+    /// assert_eq!(in_the_world[0], 1.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Pair`] with a pair whose question has no answer. Pairs that are certainly farther apart than

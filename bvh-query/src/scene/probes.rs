@@ -24,6 +24,8 @@ use crate::scene::{Scene, SceneError};
 use std::ops::ControlFlow;
 
 /// The closest point of a scene to a given one.
+///
+/// [`Scene::closest_points`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneClosestPoint {
@@ -34,6 +36,8 @@ pub struct SceneClosestPoint {
 }
 
 /// Where a ray hits a scene.
+///
+/// [`Scene::first_hits`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneRayHit {
@@ -48,6 +52,20 @@ impl Scene {
     /// all are farther away than `within`.
     ///
     /// The answer about each instance is that of [`Querier::closest_point`] for the placed instance.
+    ///
+    /// ```
+    /// use bvh_query::SceneClosestPoint;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let found = scene.closest_points(&[[-2.0, 0.0, 0.0], [9.0, 0.0, 0.0]], 3.0)?;
+    /// let [Some(SceneClosestPoint { instance, closest, .. }), None] = found[..] else { panic!("{found:?}") };
+    /// assert_eq!((instance, closest.distance, closest.point), (left, 1.0, [-1.0, 0.0, 0.0]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] for a point or limit that [`Querier::closest_point`] refuses, and [`SceneError::Instance`]
@@ -65,6 +83,19 @@ impl Scene {
     /// instance; else on a surface if it is on one; else undefined if it is in the box of an instance that has no
     /// inside; else outside.
     ///
+    /// ```
+    /// use bvh_query::Side;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let sides = scene.sides(&[[0.0, 0.0, 0.0], [1.25, 0.0, 0.0], [1.5, 0.0, 0.0]])?;
+    /// assert_eq!(sides, [Side::Inside, Side::Outside, Side::On]); // the second point is in the gap
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`Scene::closest_points`] and of [`Querier::side`].
     pub fn sides(&mut self, points: &[[f64; 3]]) -> Result<Vec<Side>, SceneError> {
@@ -72,6 +103,18 @@ impl Scene {
     }
 
     /// Returns the closest points and the sides of many points: see [`Scene::closest_points`] and [`Scene::sides`].
+    ///
+    /// ```
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let found = scene.signed_point_distances(&[[2.0, 0.0, 0.0]], f64::INFINITY)?;
+    /// let [Some((instance, signed))] = found[..] else { panic!("{found:?}") };
+    /// assert_eq!((instance, signed.value()), (right, Some(-0.5)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of both.
@@ -93,6 +136,21 @@ impl Scene {
 
     /// Returns where each of many rays in the world first hits an instance.
     ///
+    /// ```
+    /// use bvh_query::{Ray, SceneRayHit};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let rays = [Ray::new([9.0, 0.0, 0.5], [-1.0, 0.0, 0.0]), Ray::new([9.0, 0.0, 3.0], [-1.0, 0.0, 0.0])];
+    /// let found = scene.first_hits(&rays)?;
+    /// let [Some(SceneRayHit { instance, hit, .. }), None] = found[..] else { panic!("{found:?}") };
+    /// assert_eq!((instance, hit.t, hit.point), (right, 5.5, [3.5, 0.0, 0.5]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError::Query`] for a ray that [`Querier::first_hit`] refuses, and [`SceneError::Instance`] with an
     /// instance whose question has no answer. If several rays fail, the error is that of the first.
@@ -105,6 +163,19 @@ impl Scene {
     }
 
     /// Returns whether each of many rays in the world hits any instance.
+    ///
+    /// ```
+    /// use bvh_query::Ray;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let down = |x| Ray::new([x, 0.0, 3.0], [0.0, 0.0, -1.0]);
+    /// assert_eq!(scene.any_hits(&[down(0.0), down(1.25), down(2.0)])?, [true, false, true]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// Those of [`Scene::first_hits`].
@@ -120,6 +191,20 @@ impl Scene {
     /// parameter occurs once, however many instances are hit at exactly that parameter. An instance with a radius or a margin is a body
     /// of its own: entries and exits of each are hits, also where bodies overlap.
     ///
+    /// ```
+    /// use bvh_query::Ray;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let through_both = Ray::new([9.0, 0.0, 0.5], [-1.0, 0.0, 0.0]);
+    /// let hits = &scene.all_hits(&[through_both])?[0];
+    /// assert_eq!(hits.iter().map(|hit| hit.instance).collect::<Vec<_>>(), [right, right, left, left]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// Those of [`Scene::first_hits`].
     pub fn all_hits(&mut self, rays: &[Ray]) -> Result<Vec<Vec<SceneRayHit>>, SceneError> {
@@ -131,6 +216,18 @@ impl Scene {
     }
 
     /// Returns whether each of many closed segments in the world meets any instance: see [`Querier::segment_hit`].
+    ///
+    /// ```
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let through_the_gap = [[1.25, 0.0, -3.0], [1.25, 0.0, 3.0]];
+    /// let through_both = [[-9.0, 0.0, 0.5], [9.0, 0.0, 0.5]];
+    /// assert_eq!(scene.segment_hits(&[through_the_gap, through_both])?, [false, true]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] for ends that [`Querier::segment_hit`] refuses, and [`SceneError::Instance`] with an
@@ -144,6 +241,17 @@ impl Scene {
     }
 
     /// Returns whether the two points of each of many pairs in the world see each other past all instances: see [`Querier::visible`].
+    ///
+    /// ```
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let [camera, on_the_left, on_the_right] = [[-5.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [3.5, 0.0, 0.0]];
+    /// assert_eq!(scene.visible(&[[camera, on_the_left], [camera, on_the_right]], 1e-6)?, [true, false]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] for a margin or points that [`Querier::visible`] refuses; else those of [`Scene::segment_hits`].

@@ -10,6 +10,8 @@ use crate::scene::{Scene, SceneError};
 
 /// Two instances, and their signed distance. Points and directions are in A's frame; `scene.pose(pair.a)?.place(point)` returns a point
 /// in the world.
+///
+/// [`Scene::signed_distance`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub struct SceneSignedDistance {
@@ -25,6 +27,23 @@ impl Scene {
     /// is the first.
     ///
     /// Cost: that of [`Scene::relations`], and a depth for each pair that overlaps; where none does, that of [`Scene::distance`].
+    ///
+    /// ```
+    /// use bvh_query::{PenetrationOptions, SceneSignedDistance};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// let Some(SceneSignedDistance { pair, nearest, .. }) = scene.signed_distance(&PenetrationOptions::new())?
+    /// else { panic!() };
+    /// assert_eq!((pair.a, pair.b, nearest.distance), (left, right, 0.5));
+    /// scene.set_pose(right, at(1.5)?)?;
+    /// let overlapping = scene.signed_distance(&PenetrationOptions::new())?;
+    /// assert!(overlapping.is_some_and(|found| found.nearest.upper < -0.49));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] if an option is invalid; the errors of [`Scene::relations`] and [`Scene::distance`].
@@ -53,6 +72,22 @@ impl Scene {
     /// those for which [`Querier::signed_distance_within`](crate::Querier::signed_distance_within) has an answer.
     ///
     /// Cost: that question for each pair whose boxes in the world are within the margin.
+    ///
+    /// ```
+    /// use bvh_query::PenetrationOptions;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let at = |x| bvh_query::Pose::new(*bvh_query::Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// # let mut scene = bvh_query::Scene::new()?;
+    /// # let [left, right] = [scene.add(block.clone(), at(0.0)?)?, scene.add(block, at(2.5)?)?];
+    /// // The scene has two blocks, left and right, each 2 wide and with half a unit between them.
+    /// assert!(scene.near_pairs(0.4, &PenetrationOptions::new())?.is_empty());
+    /// for found in scene.near_pairs(0.6, &PenetrationOptions::new())? {
+    ///     assert_eq!((found.pair.b, found.nearest.distance), (right, 0.5));
+    ///     assert_eq!(found.nearest.normal, [1.0, 0.0, 0.0]); // in the frame of A
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`SceneError::Query`] if the margin is negative, NaN or infinite, or if an option is invalid; the errors of

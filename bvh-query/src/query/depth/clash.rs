@@ -20,6 +20,8 @@ use crate::query::querier::Querier;
 use crate::query::rounded::{limit_of_cores, sum_of_radii};
 
 /// How two parts lie. The command and the bindings of other languages use its numbers (`class as u8`) and names.
+///
+/// [`Querier::clash`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
@@ -80,6 +82,8 @@ impl ClashClass {
 }
 
 /// How two parts lie, and by how much.
+///
+/// [`Querier::clash`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -103,6 +107,8 @@ pub struct Clash {
 
 options! {
     /// What counts as a clash.
+    ///
+    /// [`Querier::clash`] has an example.
     pub struct ClashOptions {
         /// Parts at most this far apart are near, in mesh units. 0, the default, looks for no near parts. A query refuses a
         /// clearance that is negative or not finite.
@@ -145,6 +151,22 @@ impl Querier {
     ///
     /// Cost: that of `within` with the tolerance or the clearance, whichever is larger, for parts that are farther apart than
     /// both. Others also take `collide`, and a `distance` or a `penetration`; magnitudes take an `intersection`.
+    ///
+    /// ```
+    /// use bvh_query::{Clash, ClashClass, ClashOptions, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// let options = ClashOptions::new().clearance(0.5);
+    /// let near: Clash = querier.clash(&block, &block, &at(2.25)?, &options)?;
+    /// assert_eq!((near.class, near.distance), (ClashClass::Near, 0.25));
+    ///
+    /// let deep = querier.clash(&block, &block, &at(1.5)?, &options)?;
+    /// assert_eq!(deep.class, ClashClass::Overlapping);
+    /// assert!(deep.depth.is_some_and(|depth| depth.lower <= 0.5 && 0.5 <= depth.upper));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if an option is invalid; else the errors of [`Querier::relation`].

@@ -21,6 +21,8 @@ use bvh_format::kdop::FACTORS;
 use bvh_format::vec3::length;
 
 /// How far B moves along a direction until interiors are disjoint.
+///
+/// [`Querier::separation`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -34,6 +36,8 @@ pub struct Separation {
 }
 
 /// How deep two shapes overlap.
+///
+/// [`Querier::penetration`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -64,6 +68,18 @@ impl Querier {
     /// as if it did. All numbers have the same bits on all backends.
     ///
     /// Cost: some walks, each like one for contact, and as many as triangles follow each other on the way.
+    ///
+    /// ```
+    /// use bvh_query::{Pose, Querier, Separation};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let overlapping = Pose::new(*Pose::IDENTITY.rotation(), [1.5, 0.0, 0.0])?;
+    /// let Separation { lower, upper, translation, .. } =
+    ///     Querier::new()?.separation(&block, &block, &overlapping, [0.0, 0.0, 1.0])?;
+    /// assert!(lower <= 2.0 && 2.0 <= upper && upper - lower < 1e-9); // out through the top
+    /// assert_eq!(translation[..2], [0.0, 0.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if the direction is zero or not finite; [`QueryError::NotClosed`] if an object of a shape has no
@@ -108,6 +124,18 @@ impl Querier {
     /// Cost: some microseconds for convex shapes, once up to 0.2 s to find out that one of 4096 triangles is convex, and 50 bytes of memory for
     /// each of its triangles while the file is open. For others, up to a millisecond for a hundred triangles and some ten for large
     /// meshes. A budget ([`Querier::set_budget`]) ends the search early; the bounds so far are the answer.
+    ///
+    /// ```
+    /// use bvh_query::{Penetration, PenetrationOptions, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let overlapping = Pose::new(*Pose::IDENTITY.rotation(), [1.5, 0.0, 0.0])?;
+    /// let Penetration { lower, upper, translation, .. } =
+    ///     Querier::new()?.penetration(&block, &block, &overlapping, &PenetrationOptions::new())?;
+    /// assert!(lower <= 0.5 && 0.5 <= upper && upper <= 1.01 * lower);
+    /// assert!(translation[0] >= 0.5); // the shortest way out
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if an option is invalid; [`QueryError::NotClosed`] if an object of a shape has no inside;

@@ -17,6 +17,8 @@ use crate::query::rounded::limit_of_cores;
 use crate::query::tracker::Tracker;
 
 /// How far apart two shapes are or, below zero, how deep they overlap.
+///
+/// [`Querier::signed_distance`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -84,6 +86,20 @@ impl Querier {
     ///
     /// Cost: that of `distance`, and of a few sides of points; where the shapes overlap, that of `penetration`.
     ///
+    /// ```
+    /// use bvh_query::{PenetrationOptions, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let (mut querier, options) = (Querier::new()?, PenetrationOptions::new());
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// let apart = querier.signed_distance(&block, &block, &at(2.5)?, &options)?;
+    /// assert_eq!((apart.distance, apart.normal), (0.5, [1.0, 0.0, 0.0]));
+    ///
+    /// let overlapping = querier.signed_distance(&block, &block, &at(1.5)?, &options)?;
+    /// assert!(overlapping.lower <= -0.5 && -0.5 <= overlapping.upper && overlapping.translation[0] >= 0.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Number`] if an option is invalid; [`QueryError::NoTopology`] if a file was baked without topology;
     /// [`QueryError::Damaged`] if a page that the query touches is damaged; [`QueryError::Budget`] if the budget does not suffice
@@ -106,6 +122,18 @@ impl Querier {
     ///
     /// Cost: that of `within` where they are farther apart, and a few sides of points if their boxes meet; else that of
     /// `signed_distance`.
+    ///
+    /// ```
+    /// use bvh_query::{PenetrationOptions, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let (mut querier, options) = (Querier::new()?, PenetrationOptions::new());
+    /// let beside = Pose::new(*Pose::IDENTITY.rotation(), [2.5, 0.0, 0.0])?;
+    /// assert!(querier.signed_distance_within(&block, &block, &beside, 0.4, &options)?.is_none());
+    /// let near = querier.signed_distance_within(&block, &block, &beside, 0.6, &options)?;
+    /// assert_eq!(near.map(|near| near.distance), Some(0.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if the margin is negative, NaN or infinite; the errors of [`Querier::signed_distance`].

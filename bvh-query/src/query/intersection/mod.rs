@@ -37,6 +37,8 @@ use crate::traverse::walk::Order;
 use std::ops::ControlFlow;
 
 /// What two shapes have in common, in mesh units.
+///
+/// [`Querier::intersection`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -58,6 +60,8 @@ pub struct Intersection {
 }
 
 /// The boundary of what two meshes have in common, in A's frame.
+///
+/// [`Querier::intersection_surface`] has an example.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct IntersectionSurface {
@@ -102,6 +106,17 @@ impl Querier {
     /// All numbers have the same bits on all backends. Radii are left out. Cost: that of [`Querier::contacts`], some 0.5 us for each of
     /// them, and some 0.1 us and 100 bytes for each triangle in the box of the other mesh; more, up to some 20 us for each contact, where
     /// hundreds of thousands of them lie in a few faces.
+    ///
+    /// ```
+    /// use bvh_query::{Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let overlapping = Pose::new(*Pose::IDENTITY.rotation(), [1.5, 1.0, 0.5])?;
+    /// let shared = Querier::new()?.intersection(&block, &block, &overlapping)?;
+    /// assert!((shared.volume - 0.5 * 1.0 * 1.5).abs() <= shared.volume_error);
+    /// assert_eq!(shared.bounds, Some([[0.5, 0.0, -0.5], [1.0, 1.0, 1.0]]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::NotClosed`] if an object of a shape has no inside; [`QueryError::NoTopology`] if a file was baked without topology;
@@ -149,6 +164,23 @@ impl Querier {
     /// Returns the boundary of what two closed meshes have in common, as polygons, for those who draw it: the parts of A's faces inside B,
     /// and then those of B's faces inside A. See [`Querier::intersection`]. Its points are rounded; parts that are next to each other have
     /// the same points, so that there is no gap between them.
+    ///
+    /// ```
+    /// use bvh_query::{IntersectionSurface, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let overlapping = Pose::new(*Pose::IDENTITY.rotation(), [1.5, 1.0, 0.5])?;
+    /// let IntersectionSurface { points, loops, polygons, .. } =
+    ///     Querier::new()?.intersection_surface(&block, &block, &overlapping)?;
+    /// let mut rest = &points[..];
+    /// for &corners in &loops {
+    ///     let (corners, after) = rest.split_at(corners as usize); // the corners of one loop
+    ///     assert!(corners.len() >= 3);
+    ///     rest = after;
+    /// }
+    /// assert!(rest.is_empty() && polygons.iter().all(|&loops| loops == 1)); // no holes
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::intersection`].

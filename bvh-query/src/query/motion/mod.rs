@@ -42,6 +42,14 @@ use limits::Question;
 
 options! {
     /// What counts as a hit, and how exactly time is searched. By default contact does.
+    ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    ///
+    /// let options = MotionOptions::new().clearance(0.01).tolerance(1e-4);
+    /// assert_eq!((options.clearance, options.tolerance), (0.01, Some(1e-4)));
+    /// assert!(MotionOptions::new().clearance(-1.0).check().is_err());
+    /// ```
     pub struct MotionOptions {
         /// Meshes that are at most this far apart count as a hit, in mesh units; 0 for contact. A query refuses a length that is
         /// negative or not finite.
@@ -81,6 +89,8 @@ impl MotionOptions {
 }
 
 /// Whether a motion is free.
+///
+/// [`Querier::motion`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MotionAnswer {
@@ -128,6 +138,22 @@ impl Querier {
     /// be one query for each eighth of the tolerance that B moves by while it turns at a gap far below the tolerance, or moves
     /// straight at a slant to A's axes at a gap of some roundings, because a hit may still follow. A larger tolerance or a
     /// budget limits that, and [`Querier::is_free`] avoids it, because it can say no at once.
+    ///
+    /// ```
+    /// use bvh_query::{Motion, MotionAnswer, MotionOptions, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// let path = Motion::between(&at(4.0)?, &at(0.0)?)?;
+    /// match Querier::new()?.motion(&block, &block, &path, &MotionOptions::new())? {
+    ///     MotionAnswer::Hit { free_until, touching_at, nearest } => {
+    ///         assert!(free_until <= 0.5 && 0.5 <= touching_at && touching_at - free_until < 1e-5);
+    ///         assert_eq!(nearest.distance, 0.0);
+    ///     }
+    ///     other => panic!("{other:?}"),
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if the clearance or the tolerance is not a valid number, or if the tolerance is too small
@@ -183,6 +209,19 @@ impl Querier {
     /// It looks for any hit instead of the first, in poses spread over the path, so it needs less time to say no. Use
     /// it in planners.
     ///
+    /// ```
+    /// use bvh_query::{MotionOptions, Polyline, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let at = |x, y| Pose::new(*Pose::IDENTITY.rotation(), [x, y, 0.0]);
+    /// let across = Polyline::new(&[at(-3.0, 0.0)?, at(3.0, 0.0)?])?;
+    /// let around = Polyline::new(&[at(-3.0, 0.0)?, at(-3.0, 3.0)?, at(3.0, 3.0)?, at(3.0, 0.0)?])?;
+    /// assert!(!querier.is_free(&block, &block, &across, &MotionOptions::new())?);
+    /// assert!(querier.is_free(&block, &block, &around, &MotionOptions::new())?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`Querier::motion`].
     pub fn is_free<'a>(
@@ -218,6 +257,17 @@ impl Querier {
 /// Returns an upper bound, in mesh units, of how far any vertex of B is, during `[t0, t1]`, from its place in the
 /// middle of that time. It is the sum of two terms: how far vertices at either end are from their places in the middle,
 /// and the sagitta of either half. [`Querier::motion`] halves time until this is at most an eighth of the tolerance.
+///
+/// ```
+/// use bvh_query::{Motion, Pose, path_reach};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+/// let path = Motion::between(&at(0.0)?, &at(4.0)?)?;
+/// let reach = path_reach(&block, &path, 0.25, 0.75); // from the middle, 1 to either side
+/// assert!(1.0 <= reach && reach < 1.0 + 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn path_reach<'a>(b: impl Into<Shape<'a>>, path: &dyn RigidPath, t0: f64, t1: f64) -> f64 {
     let b = b.into();
     let question = Question::unchecked(b, b, path);

@@ -6,6 +6,8 @@
 
 /// One of the points at which a patch pushes: see [`PatchOptions::max_points`](crate::PatchOptions::max_points). In A's frame and in
 /// mesh units; rounded, and not certified.
+///
+/// [`Querier::patches`](crate::Querier::patches) has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct PatchPoint {

@@ -26,6 +26,8 @@ use std::ops::Range;
 options! {
     /// How contacts are joined into patches, and how many of them. By default contacts with a point in common are joined, and all
     /// of them are considered.
+    ///
+    /// [`Querier::patches`] has an example.
     pub struct PatchOptions {
         /// How far apart points of two contacts may be that belong together, in mesh units, beyond their errors. A query refuses a
         /// length that is negative or not finite.
@@ -46,6 +48,8 @@ impl PatchOptions {
 }
 
 /// Contacts that belong together, in A's frame and in mesh units. All but the first two numbers are rounded, and not certified.
+///
+/// [`Querier::patches`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Patch {
@@ -70,7 +74,7 @@ pub struct Patch {
     pub point_count: usize,
 }
 
-/// The answer of [`Querier::patches`].
+/// The answer of [`Querier::patches`], which has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Patches {
@@ -135,6 +139,23 @@ impl Querier {
     /// up to ten rays for each patch, some 10 us, and while it runs some 1 KiB for each contact. Points take up to 60 rays more for
     /// each patch, or 108 if more than eight are wanted, and 84 or 148 for rounded shapes: some 8 us for a box on a floor, and 40 us
     /// for a round patch. All of these count as visits ([`Querier::set_budget`]), as do comparisons of points that are almost alike.
+    ///
+    /// ```
+    /// use bvh_query::{Patch, PatchOptions, PatchPoint, Pose, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let small = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([1.0; 3])?, &Default::default())?.0)?;
+    /// // The small block has sunk into the top of the other one by 0.1.
+    /// let sunk = Pose::new(*Pose::IDENTITY.rotation(), [0.0, 0.0, 1.4])?;
+    /// let found = Querier::new()?.patches(&block, &small, &sunk, &PatchOptions::new().max_points(4))?;
+    /// let [Patch { normal, depth, first_point, point_count, .. }] = found.patches[..] else { panic!() };
+    /// assert_eq!(normal, [0.0, 0.0, 1.0]);
+    /// assert!((depth - 0.1).abs() < 1e-9);
+    /// for PatchPoint { point, depth, .. } in &found.points[first_point..first_point + point_count] {
+    ///     assert!(point[2] < 1.0 && (depth - 0.1).abs() < 1e-9); // the four lower corners
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if the tolerance is negative, NaN or infinite; else the errors of [`Querier::contacts`].

@@ -40,6 +40,8 @@ struct BestTriangle {
 }
 
 /// The closest point of a mesh to a given one.
+///
+/// [`Querier::closest_point`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -67,6 +69,18 @@ impl Querier {
     /// triangle. It is decided exactly whether the mesh is farther away than `within`. The answer has the same bits on
     /// all backends. A coordinate below 2^-213 counts as 0. The distance from a rounded shape is that from its core less the
     /// radius; within the radius it is 0, and the closest point is the given one.
+    ///
+    /// ```
+    /// use bvh_query::{ClosestPoint, Querier};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let found = querier.closest_point(&block, [3.0, 0.5, 0.0], f64::INFINITY)?;
+    /// let Some(ClosestPoint { distance, point, .. }) = found else { panic!() };
+    /// assert_eq!((distance, point), (2.0, [1.0, 0.5, 0.0]));
+    /// assert!(querier.closest_point(&block, [3.0, 0.5, 0.0], 1.5)?.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120, or `within` is negative or NaN;

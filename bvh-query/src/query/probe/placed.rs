@@ -13,6 +13,17 @@ use bvh_format::object::Object;
 /// A `&Bvh` or a [`Shape`] converts into the shape in its own frame. [`Shape::at`] places it by a pose, and probes are
 /// then given in the world. The question is then about the stored vertices as [`Pose::place`] places them, as in
 /// questions about pairs of meshes.
+///
+/// ```
+/// use bvh_query::{PlacedShape, Pose, Querier, Side};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let mut querier = Querier::new()?;
+/// let placed: PlacedShape<'_> = block.all().at(&Pose::new(*Pose::IDENTITY.rotation(), [10.0, 0.0, 0.0])?);
+/// assert_eq!(querier.side(placed, [10.5, 0.0, 0.0])?, Side::Inside); // in the world
+/// assert_eq!(querier.side(&block, [0.5, 0.0, 0.0])?, Side::Inside); // in its own frame
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct PlacedShape<'a> {
     pub(crate) shape: Shape<'a>,

@@ -32,6 +32,19 @@ const MIN_SORTED_BYTES: usize = 16 << 20;
 /// per thread, which it keeps for the next call, of the answers, and 16 bytes per probe. A batch of rays or segments takes less time
 /// per probe than single queries do, as some are run together.
 ///
+/// ```
+/// use bvh_query::{ProbeBatch, Ray, Side};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let batch = ProbeBatch::new(&block)?;
+/// let points: Vec<[f64; 3]> = (0..1000).map(|n| [f64::from(n) / 100.0, 0.0, 0.0]).collect();
+/// assert_eq!(batch.sides(&points)?.iter().filter(|side| **side == Side::Inside).count(), 100);
+/// assert_eq!(batch.closest_points(&points, 2.0)?.iter().flatten().count(), 301); // up to x = 3
+/// let rays = points.iter().map(|&[x, y, _]| Ray::new([x, y, 5.0], [0.0, 0.0, -1.0]));
+/// assert_eq!(batch.any_hits(&rays.collect::<Vec<_>>())?.iter().filter(|hit| **hit).count(), 101);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Each method returns the error of the first probe, in their order, that has no answer.
 #[derive(Debug, Clone)]

@@ -10,6 +10,15 @@ use crate::query::querier::Querier;
 use std::cmp::Ordering;
 
 /// A ray: all points `origin + t * direction` with `t` from 0 to `until`, both ends included.
+///
+/// ```
+/// use bvh_query::Ray;
+///
+/// let down = Ray::new([0.0, 0.0, 3.0], [0.0, 0.0, -1.0]);
+/// assert_eq!(down.until, f64::INFINITY);
+/// let up_to_a_point = Ray { origin: [0.0; 3], direction: [1.0, 2.0, 2.0], until: 1.0 };
+/// assert_eq!(up_to_a_point, Ray::new([0.0; 3], [1.0, 2.0, 2.0]).until(1.0)); // in units of the direction
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Where the ray starts, in mesh units.
@@ -35,6 +44,8 @@ impl Ray {
 }
 
 /// Where a ray hits a mesh.
+///
+/// [`Querier::first_hit`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -69,6 +80,16 @@ impl Querier {
     /// along the slabs of k-DOPs, until the file has made a tree of boxes, and so do rays with a budget.
     /// Cost: a fraction of a microsecond; without boxes about a microsecond.
     ///
+    /// ```
+    /// use bvh_query::{Querier, Ray, RayHit};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let down = Ray::new([0.25, 0.5, 3.0], [0.0, 0.0, -2.0]);
+    /// let Some(RayHit { t, point, .. }) = Querier::new()?.first_hit(&block, &down)? else { panic!() };
+    /// assert_eq!((t, point), (1.0, [0.25, 0.5, 1.0])); // t counts in lengths of the direction
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate of the origin is not finite or beyond 2^120, if the largest component of
     /// the direction is not from 2^-500 to 2^500 in magnitude, if a component is NaN, or if `until` is negative or NaN;
@@ -86,6 +107,17 @@ impl Querier {
     }
 
     /// Returns whether a ray hits a mesh at all. The decision is that of [`Querier::first_hit`].
+    ///
+    /// ```
+    /// use bvh_query::{Querier, Ray};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let down = Ray::new([0.25, 0.5, 3.0], [0.0, 0.0, -1.0]);
+    /// assert!(querier.any_hit(&block, &down)?);
+    /// assert!(!querier.any_hit(&block, &down.until(1.5))?); // ends before it
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::first_hit`].
@@ -111,6 +143,16 @@ impl Querier {
     ///
     /// Cost: that of visiting each triangle that the ray meets. For a rounded shape, some microseconds per triangle at which the ray may
     /// enter or leave the body, a fraction of a microsecond per other triangle within whose radius it comes, and up to 1 KiB for each.
+    ///
+    /// ```
+    /// use bvh_query::{Querier, Ray};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let down = Ray::new([0.25, 0.5, 3.0], [0.0, 0.0, -1.0]);
+    /// let heights: Vec<f64> = Querier::new()?.all_hits(&block, &down)?.iter().map(|hit| hit.point[2]).collect();
+    /// assert_eq!(heights, [1.0, -1.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::first_hit`].

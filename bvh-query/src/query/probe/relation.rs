@@ -18,6 +18,8 @@ use bvh_format::object::Object;
 use bvh_format::validate::packets;
 
 /// How two meshes lie. The command and the bindings of other languages use its numbers: `relation as u8`.
+///
+/// [`Querier::relation`](crate::Querier::relation) has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
@@ -52,6 +54,19 @@ impl Querier {
     /// nothing. Whether a shape is solid does not matter here.
     ///
     /// Cost: that of `collide`, and about a microsecond per connected component.
+    ///
+    /// ```
+    /// use bvh_query::{Pose, Querier, Relation};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// # let small = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([1.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// assert_eq!(querier.relation(&block, &small, &at(0.0)?)?, Relation::BInA);
+    /// assert_eq!(querier.relation(&block, &small, &at(1.0)?)?, Relation::Touching);
+    /// assert_eq!(querier.relation(&block, &small, &at(2.0)?)?, Relation::Apart);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::NoTopology`] if a file that this question needs was baked without topology;

@@ -14,6 +14,17 @@ impl Querier {
     /// The predicates of [`Querier::collide`] decide this exactly: a segment that only touches a corner, an edge or a
     /// face meets the mesh. The points may be equal. Cost: about a microsecond.
     ///
+    /// ```
+    /// use bvh_query::Querier;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// assert!(querier.segment_hit(&block, [-3.0, 0.0, 0.0], [3.0, 0.0, 0.0])?);
+    /// assert!(querier.segment_hit(&block, [-3.0, 1.0, 1.0], [3.0, 1.0, 1.0])?); // along an edge
+    /// assert!(!querier.segment_hit(&block, [-3.0, 0.0, 2.0], [3.0, 0.0, 2.0])?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120; [`QueryError::Damaged`] if a page that the query
     /// touches is damaged, [`QueryError::Budget`] if the budget does not suffice.
@@ -37,6 +48,17 @@ impl Querier {
     /// than gaps that matter, such as a millionth of the size of the mesh; it is measured along the segment. Points that are at most
     /// two margins apart see each other. The ends of what is left of the segment are rounded to nearest, and the decision about it is
     /// exact. Cost: about a microsecond.
+    ///
+    /// ```
+    /// use bvh_query::Querier;
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let (mut querier, on_the_top, lamp) = (Querier::new()?, [0.0, 0.0, 1.0], [3.0, 0.0, 5.0]);
+    /// assert!(!querier.visible(&block, on_the_top, lamp, 0.0)?); // the segment begins on the block
+    /// assert!(querier.visible(&block, on_the_top, lamp, 1e-6)?);
+    /// assert!(!querier.visible(&block, [0.0, 0.0, -1.0], lamp, 1e-6)?); // on the bottom
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`QueryError::Number`] if the margin is negative or not finite; else the errors of [`Querier::segment_hit`].

@@ -23,6 +23,8 @@ pub(crate) enum OpenObject {
 }
 
 /// On which side of a mesh a point is. The command and the bindings of other languages use its numbers: `side as i8`.
+///
+/// [`Querier::side`](crate::Querier::side) has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(i8)]
@@ -38,7 +40,8 @@ pub enum Side {
 }
 
 /// The distance of a point from the surface of a mesh, and the side that it is on. Inside overlapping parts of one mesh, the
-/// closest surface may be a face between them: see [`Querier::signed_point_distance`](crate::Querier::signed_point_distance).
+/// closest surface may be a face between them: see
+/// [`Querier::signed_point_distance`](crate::Querier::signed_point_distance), which has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -73,6 +76,17 @@ impl Querier {
     ///
     /// Cost: about a microsecond.
     ///
+    /// ```
+    /// use bvh_query::{Querier, Side};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let mut querier = Querier::new()?;
+    /// assert_eq!(querier.side(&block, [0.5, 0.0, 0.0])?, Side::Inside);
+    /// assert_eq!(querier.side(&block, [1.0, 0.0, 0.0])?, Side::On);
+    /// assert_eq!(querier.side(&block, [1.0_f64.next_up(), 0.0, 0.0])?, Side::Outside);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`QueryError::Number`] if a coordinate is not finite or beyond 2^120; [`QueryError::NoTopology`] if the file was
     /// baked without topology; [`QueryError::Damaged`] if a page that the query touches is damaged;
@@ -94,6 +108,17 @@ impl Querier {
     /// The surface is all triangles of the mesh. Where closed parts of it overlap, or one lies within another, the closest
     /// triangle may be inside the mesh: the distance is then less than that to the outside. Unite the parts before baking
     /// if only their outer surface matters.
+    ///
+    /// ```
+    /// use bvh_query::{Querier, Side, SignedPointDistance};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let found = Querier::new()?.signed_point_distance(&block, [0.75, 0.0, 0.0], f64::INFINITY)?;
+    /// let found: SignedPointDistance = found.expect("nothing is farther away than infinity");
+    /// assert_eq!((found.side, found.value()), (Side::Inside, Some(-0.25)));
+    /// assert_eq!(found.closest.point, [1.0, 0.0, 0.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Querier::closest_point`] and [`Querier::side`].
