@@ -4,6 +4,17 @@ use crate::error::RobotError;
 use crate::model::{Kind, Model, Value, quaternion_length};
 
 /// A motion of all joints: a polynomial of time, from 0 to 1, for each joint value.
+///
+/// ```
+/// use cbvh_robot::Edge;
+///
+/// let straight = Edge::straight(&[0.0, 1.0], &[2.0, 1.0])?;
+/// assert_eq!(straight.ends(), [vec![0.0, 1.0], vec![2.0, 1.0]]);
+/// // 3 t^2 - 2 t^3 starts and ends at rest.
+/// let smooth = Edge::polynomials(vec![vec![0.0, 0.0, 3.0, -2.0], vec![1.0]]);
+/// assert_eq!(smooth.ends(), [vec![0.0, 1.0], vec![1.0, 1.0]]);
+/// # Ok::<(), cbvh_robot::RobotError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Edge {
     /// The coefficients of each, the constant first.

@@ -7,6 +7,23 @@ use std::io;
 use std::path::PathBuf;
 
 /// Why there is no robot, or no answer about it.
+///
+/// ```
+/// use cbvh_robot::RobotError;
+///
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+/// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+/// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+/// #     robot.allow(a, b)?;
+/// # }
+/// assert!(matches!(robot.collide(&[0.0; 3]), Err(RobotError::Count { expected: 4, found: 3 })));
+/// let unknown = robot.allow("hand", "foot").unwrap_err();
+/// assert_eq!(
+///     unknown.to_string(),
+///     "expected the name of a body, found 'foot'; there are base, turret, upper_arm, forearm, hand"
+/// );
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RobotError {

@@ -16,6 +16,8 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 
 /// Whether a motion in joint space is free.
+///
+/// [`Robot::motion`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum RobotMotion {
@@ -72,6 +74,23 @@ impl Robot {
     /// motion after a change takes longer. The first one with a shape also reads it: for the balls of a link or an attached object,
     /// whose triangles are in memory meanwhile, or for bounds of an obstacle. Nothing of it affects an answer.
     ///
+    /// ```
+    /// use bvh_query::Pose;
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// # let ball = bvh_bake::to_bytes(&bvh_bake::shapes::point([0.0; 3]), &bvh_bake::Options::default().radius(0.1))?.0;
+    /// # let ball = bvh_query::Bvh::from_bytes(ball)?;
+    /// let (start, goal) = ([0.0; 4], [0.0, 1.0, 0.0, 0.0]);
+    /// assert!(robot.is_free(&start, &goal)?);
+    /// robot.add_obstacle("ball", ball, &Pose::new(*Pose::IDENTITY.rotation(), [0.5, 0.0, 0.7])?)?;
+    /// assert!(!robot.is_free(&start, &goal)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`Robot::collide`].
     pub fn is_free(&mut self, from: &[f64], to: &[f64]) -> Result<bool, RobotError> {
@@ -79,6 +98,20 @@ impl Robot {
     }
 
     /// Returns whether a motion is certainly free, as [`Robot::is_free`] does.
+    ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    /// use cbvh_robot::Edge;
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let smooth = Edge::polynomials(vec![vec![0.0], vec![0.0, 0.0, 1.2, -0.8], vec![0.0], vec![0.0]]);
+    /// assert!(robot.is_edge_free(&smooth, &MotionOptions::new())?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::is_free`].
@@ -88,6 +121,20 @@ impl Robot {
     }
 
     /// Returns whether each of many motions is certainly free. Uses all threads of the rayon pool in which it is called.
+    ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    /// use cbvh_robot::Edge;
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let bend = |angle: f64| Edge::straight(&[0.0; 4], &[0.0, angle, angle, 0.0]);
+    /// assert_eq!(robot.are_free(&[bend(0.5)?, bend(2.8)?], &MotionOptions::new())?, [true, false]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::is_free`], of the first motion that has one, with [`RobotError::Row`] around those of its numbers.
@@ -130,6 +177,24 @@ impl Robot {
     /// to the first hit that is known. Links that turn against each other until then, much less than the tolerance apart, take long:
     /// allow their contact, or give a larger tolerance.
     ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    /// use cbvh_robot::{Edge, RobotMotion};
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let bend = Edge::straight(&[0.0; 4], &[0.0, 2.8, 2.8, 0.0])?;
+    /// let found = robot.motion(&bend, &MotionOptions::new())?;
+    /// let RobotMotion::Hit { free_until, touching_at, joints, bodies, .. } = found else { panic!("{found:?}") };
+    /// assert!(free_until < touching_at && touching_at < 1.0);
+    /// assert!(robot.collide(&joints)?);
+    /// println!("{} touches {} at {touching_at}", bodies[0], bodies[1]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`Robot::is_free`].
     pub fn motion(&mut self, edge: &Edge, options: &MotionOptions) -> Result<RobotMotion, RobotError> {
@@ -138,6 +203,21 @@ impl Robot {
     }
 
     /// Returns for each of many motions what [`Robot::motion`] does. Uses all threads of the rayon pool in which it is called.
+    ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    /// use cbvh_robot::{Edge, RobotMotion};
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let bend = |angle: f64| Edge::straight(&[0.0; 4], &[0.0, angle, angle, 0.0]);
+    /// let found = robot.motions(&[bend(0.5)?, bend(2.8)?], &MotionOptions::new())?;
+    /// assert!(matches!(found[..], [RobotMotion::Free, RobotMotion::Hit { .. }]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::is_free`], of the first motion that has one, with [`RobotError::Row`] around those of its numbers.
@@ -151,6 +231,20 @@ impl Robot {
 
     /// Returns what touches first on a path of straight motions through many configurations, with the number of the motion; `None`
     /// if the whole path is free.
+    ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let path = [[0.0; 4], [1.0, 0.0, 0.0, 0.0], [1.0, 2.8, 2.8, 0.0]];
+    /// let found = robot.first_hit(path.iter().map(|joints| &joints[..]), &MotionOptions::new())?;
+    /// assert!(matches!(found, Some((1, _)))); // on the second motion
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::is_free`].

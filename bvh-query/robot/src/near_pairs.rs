@@ -19,6 +19,8 @@ use crate::setting::{Pair, Setting};
 use bvh_query::{NumberError, PenetrationOptions, QueryError, SignedDistance};
 
 /// Two bodies that are near each other.
+///
+/// [`Robot::near_pairs`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct NearPair {

@@ -4,6 +4,8 @@ use bvh_bake::input::UpAxis;
 use std::path::PathBuf;
 
 /// Which geometry of links to use.
+///
+/// [`RobotOptions`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Geometry {
     /// The `<collision>` geometry.
@@ -14,6 +16,8 @@ pub enum Geometry {
 }
 
 /// How the root of a robot is connected with the world.
+///
+/// [`RobotOptions`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Base {
     /// It stands at the origin.
@@ -26,6 +30,16 @@ pub enum Base {
 }
 
 /// How a robot is read.
+///
+/// ```
+/// use cbvh_robot::{Base, Geometry, Robot, RobotOptions};
+///
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+/// let options = RobotOptions { base: Base::Planar, geometry: Geometry::Collision, ..RobotOptions::default() };
+/// let robot = Robot::from_urdf(path, &options)?;
+/// assert_eq!(robot.joints(), ["base/x", "base/y", "base/theta", "waist", "shoulder", "elbow", "wrist"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct RobotOptions {
     /// Folders in which packages are looked for, before those of `ROS_PACKAGE_PATH` and those above the URDF file.

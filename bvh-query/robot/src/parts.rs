@@ -9,6 +9,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// All that a robot holds: see [`Robot::to_parts`].
+///
+/// [`Robot::to_parts`] has an example.
 #[derive(Clone, Debug)]
 pub struct RobotParts {
     /// The URDF file, for messages, and its text.
@@ -33,6 +35,8 @@ pub struct RobotParts {
 }
 
 /// An obstacle, or an object that is attached to a link.
+///
+/// [`Robot::to_parts`] has an example.
 #[derive(Clone, Debug)]
 pub struct OtherBody {
     /// Its name.
@@ -47,6 +51,25 @@ pub struct OtherBody {
 
 impl Robot {
     /// Returns all that the robot holds. Shapes are shared, not copied.
+    ///
+    /// ```
+    /// use cbvh_robot::{OtherBody, Robot, RobotParts};
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// # let ball = bvh_bake::to_bytes(&bvh_bake::shapes::point([0.0; 3]), &bvh_bake::Options::default().radius(0.1))?.0;
+    /// # let ball = bvh_query::Bvh::from_bytes(ball)?;
+    /// robot.add_obstacle("ball", ball, &bvh_query::Pose::IDENTITY)?;
+    /// let parts: RobotParts = robot.to_parts();
+    /// let [OtherBody { name, link: None, .. }] = &parts.others[..] else { panic!() };
+    /// assert_eq!((name.as_str(), parts.links.len(), parts.allowed.len()), ("ball", 5, 3));
+    /// let mut copy = Robot::from_parts(parts)?;
+    /// assert_eq!(copy.pairs(), robot.pairs());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn to_parts(&self) -> RobotParts {
         let (setting, source) = (&self.setting, &self.source);
         let name = |body: usize| self.body_name(body).unwrap_or_default().to_owned();

@@ -10,6 +10,8 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// The nearest two bodies.
+///
+/// [`Robot::distance`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RobotDistance {
@@ -22,6 +24,8 @@ pub struct RobotDistance {
 }
 
 /// The two bodies with the least signed distance.
+///
+/// [`Robot::signed_distance`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RobotSignedDistance {
@@ -39,6 +43,17 @@ impl Robot {
     /// Cost: the poses of all links, a comparison of balls for each pair, and a question about contact for pairs whose balls
     /// meet, until one touches.
     ///
+    /// ```
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// assert!(!robot.collide(&[0.0; 4])?);
+    /// assert!(robot.collide(&[0.0, 2.8, 2.8, 0.0])?); // folded into itself
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`RobotError::Count`] and [`RobotError::Value`] for invalid joint values, [`RobotError::Pose`] if a link is too far away,
     /// and [`RobotError::Pair`] if a question has no answer.
@@ -48,6 +63,19 @@ impl Robot {
     }
 
     /// Returns the bodies that touch, in the order of [`Robot::pairs`].
+    ///
+    /// ```
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// assert!(robot.pairs_in_contact(&[0.0; 4])?.is_empty());
+    /// for [a, b] in robot.pairs_in_contact(&[0.0, 2.8, 2.8, 0.0])? {
+    ///     println!("{a} touches {b}");
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::collide`].
@@ -66,6 +94,20 @@ impl Robot {
     ///
     /// Cost: that of [`Robot::pairs_in_contact`], and a question about contact for pairs whose boxes meet.
     ///
+    /// ```
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// # let room = bvh_bake::to_bytes(&bvh_bake::shapes::block([9.0; 3])?, &Default::default())?.0;
+    /// # let room = bvh_query::Bvh::from_bytes(room)?;
+    /// robot.add_obstacle("room", room, &bvh_query::Pose::IDENTITY)?; // a block of 9 m
+    /// assert!(!robot.collide(&[0.0; 4])?); // the walls are far away
+    /// assert!(robot.pairs_inside(&[0.0; 4])?.contains(&["hand".to_owned(), "room".to_owned()]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The errors of [`Robot::collide`]; [`RobotError::Pair`] also if a file in question was baked without topology.
     pub fn pairs_inside(&mut self, joints: &[f64]) -> Result<Vec<[String; 2]>, RobotError> {
@@ -75,6 +117,21 @@ impl Robot {
     }
 
     /// Returns the nearest two bodies; `None` if there are no pairs.
+    ///
+    /// ```
+    /// use cbvh_robot::RobotDistance;
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let Some(RobotDistance { bodies, nearest, points, .. }) = robot.distance(&[0.0; 4])? else { panic!() };
+    /// println!("{} and {} are {} m apart", bodies[0], bodies[1], nearest.distance);
+    /// let squared: f64 = (0..3).map(|k| (points[0][k] - points[1][k]).powi(2)).sum();
+    /// assert!((squared.sqrt() - nearest.distance).abs() < 1e-9); // the points are in the world
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::collide`].
@@ -89,6 +146,22 @@ impl Robot {
     /// unless one of them is not closed.
     ///
     /// Cost: that of [`Robot::distance`], and a depth for each pair that overlaps.
+    ///
+    /// ```
+    /// use bvh_query::PenetrationOptions;
+    /// use cbvh_robot::RobotSignedDistance;
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let folded = robot.signed_distance(&[0.0, 2.8, 2.8, 0.0], &PenetrationOptions::new())?;
+    /// let Some(RobotSignedDistance { bodies, nearest, .. }) = folded else { panic!() };
+    /// println!("{} and {} overlap by {} m at most", bodies[0], bodies[1], -nearest.lower);
+    /// assert!(nearest.upper < 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::collide`]; [`RobotError::Query`] if an option is invalid; [`RobotError::Pair`] also if a file in question
@@ -120,6 +193,17 @@ impl Robot {
 
     /// Returns for each of many configurations, one after the other, whether any two bodies touch. Uses all threads of the rayon
     /// pool in which it is called; the answers do not depend on their number.
+    ///
+    /// ```
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let two = [0.0, 0.0, 0.0, 0.0, /* and */ 0.0, 2.8, 2.8, 0.0];
+    /// assert_eq!(robot.collide_many(&two)?, [false, true]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::collide`], for the first configuration that has one, with [`RobotError::Row`] around those of its numbers;
@@ -194,6 +278,15 @@ impl Robot {
     /// Allows contact between pairs that collide in nearly every configuration: in at least this share of some random configurations
     /// within the joints' limits, as MoveIt's assistant does. A joint value without limits is taken between -pi and pi. Returns the
     /// pairs, each with its share. The configurations are the same each time.
+    ///
+    /// ```
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// let allowed = robot.allow_frequent(100, 0.95)?;
+    /// let neighbours = ["turret".to_owned(), "upper_arm".to_owned()];
+    /// assert!(allowed.contains(&(neighbours, 1.0))); // they overlap at their joint
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Robot::collide`].

@@ -21,6 +21,8 @@ pub(crate) struct Semantics {
 }
 
 /// A named group.
+///
+/// [`State`] has an example.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Group {
@@ -31,6 +33,23 @@ pub struct Group {
 }
 
 /// A named configuration of a group.
+///
+/// ```
+/// use cbvh_robot::{Robot, RobotOptions};
+///
+/// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+/// # let srdf = std::env::temp_dir().join(format!("cbvh-state-{}.srdf", std::process::id()));
+/// let text = r#"<robot name="small_arm">
+///     <group name="arm"><joint name="shoulder"/><joint name="elbow"/></group>
+///     <group_state name="bent" group="arm"><joint name="elbow" value="0.5"/></group_state>
+/// </robot>"#;
+/// std::fs::write(&srdf, text)?;
+/// let robot = Robot::from_urdf(path, &RobotOptions { srdf: Some(srdf.clone()), ..RobotOptions::default() })?;
+/// # std::fs::remove_file(&srdf)?;
+/// assert_eq!((robot.groups()[0].name.as_str(), &robot.groups()[0].joints[..]), ("arm", &[1, 2][..]));
+/// assert_eq!((robot.states()[0].name.as_str(), &robot.states()[0].values[..]), ("bent", &[(2, 0.5)][..]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct State {

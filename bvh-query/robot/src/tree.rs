@@ -9,6 +9,8 @@ use bvh_query::{OwnedShape, Pose};
 /// The joints of a robot, and the shapes that they carry: see [`Robot::tree`].
 ///
 /// Frame 0 is the world. The first joint moves frame 1, the second frame 2, and so on.
+///
+/// [`Robot::tree`] has an example.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct RobotTree {
@@ -21,6 +23,8 @@ pub struct RobotTree {
 }
 
 /// A joint that moves a frame.
+///
+/// [`Robot::tree`] has an example.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct TreeJoint {
@@ -43,6 +47,8 @@ pub struct TreeJoint {
 }
 
 /// How a joint moves.
+///
+/// [`Robot::tree`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum JointKind {
@@ -57,6 +63,8 @@ pub enum JointKind {
 }
 
 /// A shape of a body.
+///
+/// [`Robot::tree`] has an example.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct TreeShape {
@@ -76,6 +84,23 @@ pub struct TreeShape {
 
 impl Robot {
     /// Returns the joints, and the shapes that they carry, as plain data. Shapes are shared, not copied.
+    ///
+    /// ```
+    /// use cbvh_robot::{JointKind, RobotTree, TreeJoint, TreeShape};
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let RobotTree { joints, shapes, pairs, .. } = robot.tree()?;
+    /// let TreeJoint { name, kind, axis, .. } = &joints[1]; // moves frame 2
+    /// assert_eq!((name.as_str(), *kind, *axis), ("shoulder", JointKind::Turn, [0.0, 1.0, 0.0]));
+    /// let carried = shapes.iter().filter(|TreeShape { frame, .. }| *frame == 2);
+    /// assert_eq!(carried.map(|shape| shape.body.as_str()).collect::<Vec<_>>(), ["upper_arm"]);
+    /// assert_eq!(pairs.len(), robot.pairs().len()); // each body has one shape here
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`RobotError::Pose`] if a joint or a shape is too far from the frame that carries it.
