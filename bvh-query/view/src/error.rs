@@ -5,6 +5,18 @@ use bvh_query::{PoseError, QueryError, SceneError};
 use cbvh_robot::RobotError;
 
 /// Why a page cannot be made.
+///
+/// ```
+/// use bvh_query::Pose;
+/// use cbvh_view::{Named, Page, PageError};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let named = Named { name: "block".into(), path: "block.cbvh".into(), shape: block.into() };
+/// let page = Page::pair(named.clone(), None, &Pose::IDENTITY, Some(-1.0));
+/// assert!(matches!(page, Err(PageError::Number { name: "within", found: -1.0, .. })));
+/// assert!(matches!(Page::file(named)?.limited_to(100), Err(PageError::TooLarge { limit: 100, .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {

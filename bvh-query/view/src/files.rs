@@ -8,6 +8,16 @@ use std::collections::HashMap;
 use std::ptr;
 
 /// A shape, and what its file is called.
+///
+/// ```
+/// use cbvh_view::{Named, Page};
+///
+/// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+/// let size = block.bytes().len() as u64;
+/// let page = Page::file(Named { name: "Block".into(), path: "parts/block.cbvh".into(), shape: block.into() })?;
+/// assert_eq!(page.bytes(), size);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Named {
     /// The name that people read.

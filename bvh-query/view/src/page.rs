@@ -45,6 +45,8 @@ pub struct Page {
 }
 
 /// A shape in the world.
+///
+/// [`Page::scene`] has an example.
 #[derive(Clone, Debug)]
 pub struct Placed {
     /// The name of the instance.
@@ -62,6 +64,8 @@ pub struct Placed {
 }
 
 /// Two instances that clash, in the frame of the world. Lengths are in mesh units.
+///
+/// [`Page::clashes`] has an example.
 #[derive(Clone, Copy, Debug)]
 pub struct PlacedClash {
     /// The numbers of the instances.
@@ -145,6 +149,28 @@ impl Page {
     /// Shows a scene: instances, the pairs that may touch, further margins of pairs, and frames. A frame has the poses of all
     /// moving instances, in the order of the instances.
     ///
+    /// ```
+    /// use bvh_query::{Groups, Pose};
+    /// use cbvh_view::{Named, Page, Placed};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let of = Named { name: "block".into(), path: "block.cbvh".into(), shape: block.into() };
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// let still = Placed {
+    ///     name: "left".into(),
+    ///     of,
+    ///     pose: at(0.0)?,
+    ///     margin: 0.0,
+    ///     groups: Groups::ALL,
+    ///     moving: false,
+    /// };
+    /// let moving = Placed { name: "right".into(), pose: at(3.0)?, moving: true, ..still.clone() };
+    /// let frames = vec![vec![at(3.0)?], vec![at(2.0)?]]; // of the one that moves
+    /// let page = Page::scene([still, moving], vec![[0, 1]], vec![], frames)?; // the two may touch
+    /// # page.write(&mut std::io::sink())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`PageError::FileTooLarge`], [`PageError::Number`] for a margin, and [`PageError::Instance`] or [`PageError::Frame`] if
     /// pairs or frames do not fit the instances.
@@ -171,6 +197,32 @@ impl Page {
     }
 
     /// Shows instances and which of them clash, in this order.
+    ///
+    /// ```
+    /// use bvh_query::{Clash, ClashOptions, Groups, Pose, Querier};
+    /// use cbvh_view::{Named, Page, Placed, PlacedClash};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// let found: Clash = Querier::new()?.clash(&block, &block, &at(1.5)?, &ClashOptions::new())?;
+    /// let clash = PlacedClash {
+    ///     pair: [0, 1],
+    ///     class: found.class,
+    ///     depth: found.depth.map(|depth| [depth.lower, depth.upper]),
+    ///     distance: None,
+    ///     point: found.point, // the frame of the first instance is that of the world here
+    ///     translation: found.depth.map(|depth| depth.translation),
+    ///     volume: None,
+    ///     pierced: [None; 2],
+    /// };
+    /// # let of = Named { name: "block".into(), path: "block.cbvh".into(), shape: block.into() };
+    /// # let groups = Groups::ALL;
+    /// # let left = Placed { name: "left".into(), of, pose: at(0.0)?, margin: 0.0, groups, moving: false };
+    /// # let right = Placed { name: "right".into(), pose: at(1.5)?, ..left.clone() };
+    /// let page = Page::clashes([left, right], &[clash])?;
+    /// # page.write(&mut std::io::sink())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`PageError::FileTooLarge`], [`PageError::Number`] for a margin or a number of a clash, and [`PageError::Instance`] if a

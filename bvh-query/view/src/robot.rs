@@ -14,6 +14,8 @@ const STILL: u32 = 1;
 const CARRIED: u32 = 2;
 
 /// A configuration or an edge that the page of a robot lists.
+///
+/// [`Page::of_robot`] has an example.
 #[derive(Clone, Debug)]
 pub struct RobotLine<'a> {
     /// The joint values of the configuration, or those at the start of the edge.
@@ -29,6 +31,23 @@ impl Page {
     /// The page computes where joint values put the links, and asks which bodies touch there. Its poses are those of
     /// [`Robot::link_poses`] but for roundings, because browsers round sines and cosines in ways of their own. The answers about
     /// edges are the given ones.
+    ///
+    /// ```
+    /// use bvh_query::MotionOptions;
+    /// use cbvh_robot::Edge;
+    /// use cbvh_view::{Page, RobotLine};
+    ///
+    /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
+    /// # let mut robot = cbvh_robot::Robot::from_urdf(path, &Default::default())?;
+    /// # for [a, b] in [["turret", "upper_arm"], ["upper_arm", "forearm"], ["forearm", "hand"]] {
+    /// #     robot.allow(a, b)?;
+    /// # }
+    /// let (start, goal) = (vec![0.0; 4], vec![0.0, 0.4, 0.0, 0.0]);
+    /// let motion = robot.motion(&Edge::straight(&start, &goal)?, &MotionOptions::new())?;
+    /// let page = Page::of_robot(&mut robot, [RobotLine { start, edge: Some((goal, &motion)) }])?;
+    /// # page.write(&mut std::io::sink())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`PageError::FileTooLarge`]; [`PageError::Robot`] if a line has no valid joint values, or if they put a link too far away.

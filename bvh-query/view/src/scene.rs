@@ -8,6 +8,8 @@ use std::collections::HashMap;
 use std::fmt::Display;
 
 /// Which instances of a scene move, and how.
+///
+/// [`Page::of_scene`] has an example.
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
     /// The instances that move.
@@ -19,6 +21,22 @@ pub struct Frames {
 impl Page {
     /// Shows a scene as it is, and frames of those instances that move. `file_of` gives the name and the path of the file of an
     /// instance, and `number_of` the number after the `#` that an instance without a name is called.
+    ///
+    /// ```
+    /// use bvh_query::{Pose, Scene};
+    /// use cbvh_view::{Frames, Page};
+    ///
+    /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
+    /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
+    /// let mut scene = Scene::new()?;
+    /// scene.add(block.clone(), at(0.0)?)?;
+    /// let right = scene.add_named("right", block, at(3.0)?)?;
+    /// let frames = Frames { moving: vec![right], poses: vec![vec![at(3.0)?], vec![at(2.0)?]] };
+    /// let file_of = |_| ("block".to_owned(), "block.cbvh".to_owned());
+    /// let page = Page::of_scene(&scene, &frames, file_of, |id| id.to_bits())?;
+    /// # page.write(&mut std::io::sink())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The errors of [`Page::scene`]; [`PageError::NotInScene`] if what moves is not in the scene; [`PageError::Shape`] if the file
