@@ -5,6 +5,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Stops queries: a flag that another thread, a timer or a signal handler sets, or a function that returns whether to stop, such as
 /// one that looks at the time. See [`Querier::set_stop`](crate::Querier::set_stop).
+///
+/// ```
+/// use bvh_query::{Querier, Stop};
+/// use std::sync::Arc;
+/// use std::time::{Duration, Instant};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut querier = Querier::new()?;
+/// let end = Instant::now() + Duration::from_secs(5);
+/// let stop: Arc<dyn Stop> = Arc::new(move || Instant::now() > end);
+/// querier.set_stop(Some(stop.clone())); // no query goes on after five seconds
+/// assert!(!stop.is_set());
+/// # Ok(())
+/// # }
+/// ```
 pub trait Stop: Send + Sync {
     /// Returns whether queries have to stop. Threads of a query call it before the first visit and after each 256 visits.
     fn is_set(&self) -> bool;
