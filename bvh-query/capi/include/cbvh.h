@@ -429,7 +429,7 @@ cbvh_status cbvh_stop_new(cbvh_stop *stop);
 cbvh_status cbvh_stop_set(cbvh_stop stop);
 /* Clears a flag. Questions that begin afterwards are answered. */
 cbvh_status cbvh_stop_clear(cbvh_stop stop);
-/* Frees the handle of a flag. Those that have the flag keep it as it is. */
+/* Frees the handle of a flag. Queriers, scenes and robots keep the flag that they were given, set or not. */
 cbvh_status cbvh_stop_free(cbvh_stop stop);
 /* Gives a flag to a querier, in place of the one that it has; a handle of 0 removes it. The first check of a list of
  * duplicates or of the topology of a file, and the boxes that an open file gets for its rays, are not stopped. */

@@ -147,7 +147,7 @@ impl Flag {
 
     /// Begins a block, in which the flag stops questions of this thread.
     fn enter(&self) {
-        // A time that no clock has is none.
+        // A time too far ahead for the clock never comes.
         let until = self.after.and_then(|after| Instant::now().checked_add(after));
         let entered = Entered { flag: Arc::clone(&self.flag), until };
         ENTERED.with_borrow_mut(|all| all.push(entered));

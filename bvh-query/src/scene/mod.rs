@@ -8,6 +8,7 @@
 
 mod attachments;
 mod broad_phase;
+mod candidates;
 mod contents;
 mod error;
 mod groups;
@@ -20,11 +21,12 @@ mod trackers;
 mod workers;
 mod world_box;
 
+pub use candidates::ScenePair;
 pub use error::{InstanceLabel, SceneError};
 pub use groups::Groups;
 pub use instance::InstanceId;
 pub use motions::SceneMotionAnswer;
-pub use pair_questions::{SceneClash, SceneContact, SceneDistance, ScenePair};
+pub use pair_questions::{SceneClash, SceneContact, SceneDistance};
 pub use probes::{SceneClosestPoint, SceneRayHit};
 pub use signed_distance::SceneSignedDistance;
 

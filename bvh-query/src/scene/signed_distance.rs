@@ -5,7 +5,7 @@ use crate::error::NumberError;
 use crate::query::depth::options::PenetrationOptions;
 use crate::query::depth::signed_distance::SignedDistance;
 use crate::query::options::check;
-use crate::scene::pair_questions::ScenePair;
+use crate::scene::candidates::ScenePair;
 use crate::scene::{Scene, SceneError};
 
 /// Two instances, and their signed distance. Points and directions are in A's frame; `scene.pose(pair.a)?.place(point)` returns a point
