@@ -13,7 +13,7 @@
 //!                                                  └──> what programs draw (tree)
 //! ```
 //!
-//! See [`Robot`] for an example. Use `bvh_query::Scene` for bodies that no joints connect.
+//! See [`Robot`] for an example. The feature `serde` serialises answers. Use `bvh_query::Scene` for bodies that no joints connect.
 
 mod around;
 mod asker;

@@ -19,6 +19,7 @@ use std::collections::VecDeque;
 ///
 /// [`Robot::motion`] has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum RobotMotion {
     /// At no time from 0 to 1 is any pair within the clearance.

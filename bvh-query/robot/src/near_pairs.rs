@@ -22,6 +22,7 @@ use bvh_query::{NumberError, PenetrationOptions, QueryError, SignedDistance};
 ///
 /// [`Robot::near_pairs`] has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct NearPair {
     /// The names of both.

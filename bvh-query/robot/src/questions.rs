@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 ///
 /// [`Robot::distance`] has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct RobotDistance {
     /// The names of both.
@@ -27,6 +28,7 @@ pub struct RobotDistance {
 ///
 /// [`Robot::signed_distance`] has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct RobotSignedDistance {
     /// The names of both.

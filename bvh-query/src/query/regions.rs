@@ -15,6 +15,7 @@ use std::ops::ControlFlow;
 ///
 /// [`Querier::contact_regions`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum RegionKind {
     /// They touch in one point.
@@ -29,6 +30,7 @@ pub enum RegionKind {
 ///
 /// [`Querier::contact_regions`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ContactRegion {
     /// The triangles.
@@ -66,6 +68,7 @@ impl ContactRegion {
 
 /// The answer of [`Querier::contact_regions`], which has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ContactRegions {
     /// The first contacts in ascending order, up to the limit.

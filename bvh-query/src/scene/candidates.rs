@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// [`Scene::pairs_within`] has an example.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ScenePair {
     /// The instance in whose frame answers are given.
     pub a: InstanceId,

@@ -23,7 +23,11 @@ use std::sync::Arc;
 /// assert_eq!(InstanceId::from_bits(id.to_bits()), id); // as a number, for other languages
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// With the feature `serde`, answers about scenes are written with these numbers. They are not read again, because a number stands for
+/// an instance of one scene alone.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(into = "u64"))]
 pub struct InstanceId {
     pub(super) place: u32,
     /// How often the place was taken before.
@@ -40,6 +44,14 @@ impl InstanceId {
     /// instance.
     pub fn from_bits(bits: u64) -> Self {
         Self { place: bits as u32, generation: (bits >> 32) as u32 }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<InstanceId> for u64 {
+    /// Returns the number of [`InstanceId::to_bits`].
+    fn from(id: InstanceId) -> Self {
+        id.to_bits()
     }
 }
 

@@ -30,6 +30,7 @@ const MOST_SLICES: usize = 16;
 ///
 /// [`Scene::motion`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum SceneMotionAnswer {
     /// At no time from 0 to 1 is any pair within the clearance.
     Free,

@@ -16,6 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 ///
 /// [`Scene::contacts`] has an example.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SceneContact {
     /// The instances.
@@ -29,6 +30,7 @@ pub struct SceneContact {
 ///
 /// [`Scene::distance`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SceneDistance {
     /// The instances: of equally near pairs, the first.
@@ -42,6 +44,7 @@ pub struct SceneDistance {
 ///
 /// [`Scene::clashes`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SceneClash {
     /// The instances.

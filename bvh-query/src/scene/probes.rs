@@ -27,6 +27,7 @@ use std::ops::ControlFlow;
 ///
 /// [`Scene::closest_points`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SceneClosestPoint {
     /// The instance: of equally near ones, the first.
@@ -39,6 +40,7 @@ pub struct SceneClosestPoint {
 ///
 /// [`Scene::first_hits`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SceneRayHit {
     /// The instance: of those hit at exactly the same parameter, the first.

@@ -13,6 +13,7 @@ use crate::scene::{Scene, SceneError};
 ///
 /// [`Scene::signed_distance`] has an example.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SceneSignedDistance {
     /// The instances.

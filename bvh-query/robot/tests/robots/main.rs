@@ -10,6 +10,8 @@ mod misuse;
 mod near_pairs;
 mod parts;
 mod questions;
+#[cfg(feature = "serde")]
+mod serialised;
 mod stop;
 mod tree;
 mod turns;

@@ -63,6 +63,8 @@ pub struct Intersection {
 ///
 /// [`Querier::intersection_surface`] has an example.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
 #[non_exhaustive]
 pub struct IntersectionSurface {
     /// The corners of all polygons, loop by loop.
@@ -72,6 +74,28 @@ pub struct IntersectionSurface {
     pub loops: Vec<u32>,
     /// The number of loops of each polygon: its outline and then its holes.
     pub polygons: Vec<u32>,
+}
+
+/// A boundary as it is read, whose numbers need not add up.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    points: Vec<[f64; 3]>,
+    loops: Vec<u32>,
+    polygons: Vec<u32>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for IntersectionSurface {
+    type Error = &'static str;
+
+    fn try_from(Unchecked { points, loops, polygons }: Unchecked) -> Result<Self, &'static str> {
+        let sum = |numbers: &[u32]| numbers.iter().map(|&number| u64::from(number)).sum::<u64>();
+        if sum(&loops) == points.len() as u64 && sum(&polygons) == loops.len() as u64 {
+            return Ok(Self { points, loops, polygons });
+        }
+        Err("expected as many points and loops as the loops and polygons count, found others")
+    }
 }
 
 /// What the boundary of an intersection is made of.

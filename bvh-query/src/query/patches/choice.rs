@@ -9,6 +9,7 @@
 ///
 /// [`Querier::patches`](crate::Querier::patches) has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct PatchPoint {
     /// The middle between both surfaces on a line along the patch's normal, or a point of the curve in which they meet.

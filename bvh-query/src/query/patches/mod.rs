@@ -51,6 +51,7 @@ impl PatchOptions {
 ///
 /// [`Querier::patches`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Patch {
     /// The place of its first contact in [`Patches::regions`].
@@ -76,6 +77,8 @@ pub struct Patch {
 
 /// The answer of [`Querier::patches`], which has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Unchecked"))]
 #[non_exhaustive]
 pub struct Patches {
     /// In the order of their lowest contacts.
@@ -86,6 +89,34 @@ pub struct Patches {
     pub points: Vec<PatchPoint>,
     /// The number of all contacts.
     pub total: u64,
+}
+
+/// Patches as they are read, which may name places beyond the lists.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked {
+    patches: Vec<Patch>,
+    regions: Vec<ContactRegion>,
+    points: Vec<PatchPoint>,
+    total: u64,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for Patches {
+    type Error = &'static str;
+
+    fn try_from(Unchecked { patches, regions, points, total }: Unchecked) -> Result<Self, &'static str> {
+        let is_within =
+            |first: usize, count: usize, of: usize| first.checked_add(count).is_some_and(|end| end <= of);
+        let are_within = patches.iter().all(|patch| {
+            is_within(patch.first, patch.count, regions.len())
+                && is_within(patch.first_point, patch.point_count, points.len())
+        });
+        if are_within && regions.len() as u64 <= total {
+            return Ok(Self { patches, regions, points, total });
+        }
+        Err("expected patches whose contacts and points are in the lists, found others")
+    }
 }
 
 impl Patches {
