@@ -8,7 +8,7 @@
 //!
 //! [`FileBake`] bakes mesh files (OBJ, STL, PLY, glTF, COLLADA, XYZ, PCD) of any size within a memory budget, [`to_bytes`] bakes a
 //! [`Mesh`](mesh::Mesh) in memory, and [`build_rs::bake`] bakes a mesh of the source tree from a build script.
-//! [`Options`] lists the choices; the defaults suit most meshes.
+//! [`Options`] lists the choices; the defaults suit most meshes. [`Options::stop`] lets a flag or a time end a bake.
 //!
 //! ```
 //! use bvh_bake::{Effort, Options, mesh::Mesh, to_bytes};
@@ -76,7 +76,7 @@ pub use bvh_format::object::MAX_RADIUS;
 pub use bvh_format::open_edges::{EdgesOfKind, Gaps, OpenEdge, OpenEdges};
 pub use bvh_format::profile::Profile;
 pub use bvh_format::source::Source;
-pub use bvh_format::{FormatError, Layout};
+pub use bvh_format::{FormatError, Layout, Stop};
 pub use check::open_edges::open_edges;
 pub use check::prove::{prove_bounds, validate_in_parallel};
 pub use check::verify::{VerifyError, VerifyOptions, VerifyReport, verify, verify_files};

@@ -1,7 +1,9 @@
 //! The options of a bake.
 
+use bvh_format::Stop;
 use bvh_format::leaf::TriangleEncoding;
 use bvh_format::profile::Profile;
+use std::sync::Arc;
 
 /// The time that a bake spends on a better tree. The answers and the guarantees are the same, and each bake is proved.
 ///
@@ -131,6 +133,8 @@ pub struct Options {
     /// Whether the file states which objects are closed, with a triangle of each component. Questions about what is
     /// inside a mesh need it. It takes less than 0.01 bytes per triangle, unless a mesh has many components or duplicates.
     pub topology: bool,
+    /// What stops a bake that is under way. It changes no bytes, and [`Self::stamp`] leaves it out. See [`Self::stop`].
+    pub stop: Option<Arc<dyn Stop>>,
 }
 
 impl Default for Options {
@@ -149,6 +153,7 @@ impl Default for Options {
             radius: 0.0,
             solid: false,
             topology: true,
+            stop: None,
         }
     }
 }
@@ -230,6 +235,31 @@ impl Options {
     #[must_use]
     pub fn topology(self, topology: bool) -> Self {
         Self { topology, ..self }
+    }
+
+    /// Stops the bake when another thread, a timer or a signal handler sets a flag, or when the function that stands in its place
+    /// returns true. The bake then ends with [`BakeError::Stopped`](crate::BakeError::Stopped), most often within a tenth of a second,
+    /// and leaves nothing behind: an output that was there stays as it was. One flag may stop many bakes, and the queries of
+    /// `bvh_query`, too.
+    ///
+    /// What is not stopped is what does not go piece by piece: a wait for the system, such as for the medium or a pipe, a sort that has
+    /// room in memory, and the parsing of an XML or JSON document.
+    ///
+    /// ```
+    /// use bvh_bake::{BakeError, Options, shapes, to_bytes};
+    /// use std::sync::Arc;
+    /// use std::sync::atomic::{AtomicBool, Ordering};
+    ///
+    /// let stop = Arc::new(AtomicBool::new(false));
+    /// let options = Options::default().stop(Some(stop.clone()));
+    /// assert!(to_bytes(&shapes::block([2.0; 3])?, &options).is_ok());
+    /// stop.store(true, Ordering::Relaxed); // on any thread
+    /// assert!(matches!(to_bytes(&shapes::block([2.0; 3])?, &options), Err(BakeError::Stopped)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn stop(self, stop: Option<Arc<dyn Stop>>) -> Self {
+        Self { stop, ..self }
     }
 
     /// Returns the options as one line of text. Equal options give equal text.

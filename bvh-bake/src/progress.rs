@@ -1,12 +1,15 @@
-//! The progress of a bake, and its bytes read and written: counters that the stages update and any thread may read.
+//! The progress of a bake, its bytes read and written, and what may stop it: counters that the stages update and any thread may read.
 //!
 //! Each step counts in a unit of its own what it has done, where a part of it is done: bytes where inputs are read and where the
 //! output is written, triangles where a part or a brick is ready, pages where they are proved. Counters are relaxed atomic
 //! sums, and the bake does not depend on them. While the bake runs, counters that are read together may be from slightly
 //! different moments. When it has ended, they are exact.
 
+use crate::error::BakeError;
+use bvh_format::Stop;
+use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// A stage of a bake, as shown to users.
 ///
@@ -129,7 +132,19 @@ impl Traffic {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Default)]
-pub struct Progress(Arc<Counters>);
+pub struct Progress {
+    counters: Arc<Counters>,
+    /// What may stop the bake, in the clones that the bake itself uses.
+    ending: Option<Arc<Ending>>,
+}
+
+/// What may stop a bake, and whether it has.
+#[derive(Debug)]
+struct Ending {
+    stop: Arc<dyn Stop>,
+    /// Whether a thread has found the stop set. All others then end, too, without asking it.
+    has_come: AtomicBool,
+}
 
 #[derive(Debug, Default)]
 struct Counters {
@@ -167,19 +182,19 @@ impl Progress {
     /// Later, they are as many as the work so far is worth. When a step has ended, the number is that of the input up to
     /// [`Stage::Prepare`], and then that of the stored triangles.
     pub fn triangles(&self, step: Step) -> u64 {
-        let found = self.0.found.load(Ordering::Relaxed);
+        let found = self.counters.found.load(Ordering::Relaxed);
         if step == Step::Read {
             return found;
         }
         let is_input = step == Step::Bake(Stage::Prepare);
-        let left_out = if is_input { 0 } else { self.0.left_out.load(Ordering::Relaxed) };
+        let left_out = if is_input { 0 } else { self.counters.left_out.load(Ordering::Relaxed) };
         let (done, total) = self.work(step);
         (u128::from(done) * u128::from(found.saturating_sub(left_out)) / u128::from(total.max(1))) as u64
     }
 
     /// Returns what a step has done, and all that it has to do.
     fn work(&self, step: Step) -> (u64, u64) {
-        let Work { done, total } = &self.0.work[step.index()];
+        let Work { done, total } = &self.counters.work[step.index()];
         let (done, total) = (done.load(Ordering::Relaxed), total.load(Ordering::Relaxed));
         (done.min(total), total)
     }
@@ -187,7 +202,7 @@ impl Progress {
     /// Returns the bytes read and written so far.
     pub fn traffic(&self) -> Traffic {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        let counters = &*self.0;
+        let counters = &*self.counters;
         Traffic {
             input_read: of(&counters.input_read),
             scratch_written: of(&counters.scratch_written),
@@ -198,76 +213,103 @@ impl Progress {
         }
     }
 
+    /// Returns the same progress, for the parts of a bake that may be stopped.
+    pub(crate) fn stopped_by(&self, stop: Option<Arc<dyn Stop>>) -> Self {
+        let ending = stop.map(|stop| Arc::new(Ending { stop, has_come: AtomicBool::new(false) }));
+        Self { counters: self.counters.clone(), ending }
+    }
+
+    /// Returns an error if the bake has to stop. Every stage calls this for each piece of its work.
+    pub(crate) fn go_on(&self) -> Result<(), BakeError> {
+        let Some(Ending { stop, has_come }) = self.ending.as_deref() else { return Ok(()) };
+        if has_come.load(Ordering::Relaxed) || stop.is_set() {
+            has_come.store(true, Ordering::Relaxed);
+            return Err(BakeError::Stopped);
+        }
+        Ok(())
+    }
+
+    /// Returns an error of input or output if the bake has to stop.
+    pub(crate) fn go_on_with_io(&self) -> io::Result<()> {
+        self.go_on().map_err(io::Error::other)
+    }
+
+    /// Returns how a bake ended. One that was stopped has no other error, whatever that stopped first.
+    pub(crate) fn ended<T>(&self, ended: Result<T, BakeError>) -> Result<T, BakeError> {
+        let is_stopped = self.ending.as_ref().is_some_and(|ending| ending.has_come.load(Ordering::Relaxed));
+        ended.map_err(|error| if is_stopped { BakeError::Stopped } else { error })
+    }
+
     /// Adds triangles that were found.
     pub(crate) fn find(&self, triangles: u64) {
-        self.0.found.fetch_add(triangles, Ordering::Relaxed);
+        self.counters.found.fetch_add(triangles, Ordering::Relaxed);
     }
 
     /// Records that all inputs have been read.
     pub(crate) fn end_reading(&self) {
         self.end(Step::Read);
-        let passes = PASSES * self.0.found.load(Ordering::Relaxed);
+        let passes = PASSES * self.counters.found.load(Ordering::Relaxed);
         self.expect(Step::Bake(Stage::Prepare), passes);
         self.expect(Step::Bake(Stage::Build), passes);
     }
 
     /// Records duplicates, of which the second pass of [`Stage::Prepare`] and all later steps know nothing.
     pub(crate) fn leave_out(&self, triangles: u64) {
-        self.0.left_out.fetch_add(triangles, Ordering::Relaxed);
+        self.counters.left_out.fetch_add(triangles, Ordering::Relaxed);
         self.add(Step::Bake(Stage::Prepare), triangles);
-        let build = &self.0.work[Step::Bake(Stage::Build).index()];
+        let build = &self.counters.work[Step::Bake(Stage::Build).index()];
         build.total.fetch_sub(PASSES * triangles, Ordering::Relaxed);
     }
 
     /// Records how much work a step has, in its unit.
     pub(crate) fn expect(&self, step: Step, total: u64) {
-        self.0.work[step.index()].total.store(total, Ordering::Relaxed);
+        self.counters.work[step.index()].total.store(total, Ordering::Relaxed);
     }
 
     /// Adds work that a step has done.
     pub(crate) fn add(&self, step: Step, done: u64) {
-        self.0.work[step.index()].done.fetch_add(done, Ordering::Relaxed);
+        self.counters.work[step.index()].done.fetch_add(done, Ordering::Relaxed);
     }
 
     /// Records that a step has ended.
     pub(crate) fn end(&self, step: Step) {
-        let Work { done, total } = &self.0.work[step.index()];
+        let Work { done, total } = &self.counters.work[step.index()];
         total.fetch_max(1, Ordering::Relaxed);
         done.store(total.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 
     pub(crate) fn add_input_read(&self, bytes: u64) {
-        self.0.input_read.fetch_add(bytes, Ordering::Relaxed);
+        self.counters.input_read.fetch_add(bytes, Ordering::Relaxed);
     }
 
     pub(crate) fn add_scratch_read(&self, bytes: u64) {
-        self.0.scratch_read.fetch_add(bytes, Ordering::Relaxed);
+        self.counters.scratch_read.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Records that scratch files have grown.
     pub(crate) fn add_scratch_written(&self, bytes: u64) {
-        let held = self.0.scratch_held.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        self.0.scratch_most.fetch_max(held, Ordering::Relaxed);
-        self.0.scratch_written.fetch_add(bytes, Ordering::Relaxed);
+        let held = self.counters.scratch_held.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        self.counters.scratch_most.fetch_max(held, Ordering::Relaxed);
+        self.counters.scratch_written.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Records that a scratch file was deleted.
     pub(crate) fn drop_scratch(&self, bytes: u64) {
-        self.0.scratch_held.fetch_sub(bytes, Ordering::Relaxed);
+        self.counters.scratch_held.fetch_sub(bytes, Ordering::Relaxed);
     }
 
     pub(crate) fn add_output_written(&self, bytes: u64) {
-        self.0.output_written.fetch_add(bytes, Ordering::Relaxed);
+        self.counters.output_written.fetch_add(bytes, Ordering::Relaxed);
     }
 
     pub(crate) fn add_output_read(&self, bytes: u64) {
-        self.0.output_read.fetch_add(bytes, Ordering::Relaxed);
+        self.counters.output_read.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// The present size of all scratch files, in bytes.
     #[cfg(test)]
     pub(crate) fn scratch_held(&self) -> u64 {
-        self.0.scratch_held.load(Ordering::Relaxed)
+        self.counters.scratch_held.load(Ordering::Relaxed)
     }
 }
 

@@ -76,6 +76,7 @@ pub mod rewrite_rounding;
 mod rule;
 pub mod slabs;
 pub mod source;
+mod stop;
 pub mod topology;
 pub mod treelet;
 pub mod turning;
@@ -86,6 +87,7 @@ pub mod vertex;
 pub use error::FormatError;
 pub use layout::Layout;
 pub use rule::Rule;
+pub use stop::Stop;
 
 /// Compiles the example of the crate's README.
 #[cfg(doctest)]

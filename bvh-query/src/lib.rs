@@ -30,8 +30,8 @@
 //! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
 //! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
 //! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the feature
-//! `serde` serialises poses and plain answers. Features whose names begin with `__` are
-//! not part of the public interface. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
+//! `serde` serialises poses and answers, and reads them again, except for those about scenes, which name instances of one scene.
+//! Features whose names begin with `__` are not part of the public interface. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
 //! the world, in the world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
 //!
 //! A query about two meshes walks both trees together, and one about a point or a line walks one tree. Nodes and triangles
@@ -89,7 +89,6 @@ mod numerics;
 mod pose;
 mod query;
 mod scene;
-mod stop;
 mod traverse;
 
 pub use error::{FileChange, NumberError, OpenError, QueryError};
@@ -135,7 +134,6 @@ pub use scene::{
     Groups, InstanceId, InstanceLabel, Scene, SceneClash, SceneClosestPoint, SceneContact, SceneDistance,
     SceneError, SceneMotionAnswer, ScenePair, SceneRayHit, SceneSignedDistance,
 };
-pub use stop::Stop;
 
 /// Embeds a `.cbvh` file into the program and opens it: `Result<Bvh, FormatError>`.
 ///
@@ -177,7 +175,7 @@ pub use bvh_format::leaf::TriangleEncoding;
 pub use bvh_format::object::Object;
 pub use bvh_format::open_edges::{EdgesOfKind, Gaps, OpenEdge, OpenEdges};
 pub use bvh_format::profile::Profile;
-pub use bvh_format::{FormatError, Layout, Rule};
+pub use bvh_format::{FormatError, Layout, Rule, Stop};
 
 /// Any error of this crate: each operation has an error of its own, and `?` turns all of them into this one.
 ///

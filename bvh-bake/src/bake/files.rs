@@ -142,7 +142,14 @@ impl<'a> FileBake<'a> {
     /// [`BakeError::Scratch`] if the system refuses scratch files; [`BakeError::Write`] if it refuses the output; and the
     /// errors of [`crate::to_bytes`]. After any of them, the output is unchanged, and no other file is left.
     pub fn run(mut self) -> Result<Outcome, BakeError> {
+        self.progress = self.progress.stopped_by(self.options.stop.clone());
+        let progress = self.progress.clone();
+        progress.ended(self.finish())
+    }
+
+    fn finish(mut self) -> Result<Outcome, BakeError> {
         (self.on_step)(Step::Read);
+        self.progress.go_on()?;
         if self.inputs.is_empty() {
             return Err(InputError::Empty.into());
         }

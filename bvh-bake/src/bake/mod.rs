@@ -44,7 +44,8 @@ use std::time::Instant;
 /// # Errors
 /// `BakeError::Input` for a mesh that breaks the input contract (see `Mesh::check`), `Limit` for a mesh that exceeds a
 /// limit of the format, `MaxError` for an `Options::max_error` above a hundredth of the diagonal of an object's box, `Weld` for an
-/// `Options::weld` that is no finite length or exceeds that diagonal, and `Unproved` if the result fails its own checks.
+/// `Options::weld` that is no finite length or exceeds that diagonal, `Stopped` if `Options::stop` was set, and `Unproved` if the result
+/// fails its own checks.
 pub fn to_bytes(mesh: &Mesh, options: &Options) -> Result<(Vec<u8>, BakeReport), BakeError> {
     let count: usize = mesh.objects.iter().map(|object| object.triangles.len()).sum();
     let pays = count as u64 <= threads::MAX_ALONE_TRIANGLES;
@@ -65,16 +66,18 @@ pub fn to_bytes_with(
     // The standard library has no clock in a web page; asking for the time would panic.
     let has_clock = !cfg!(all(target_family = "wasm", target_os = "unknown"));
     let start = has_clock.then(Instant::now);
+    let progress = Progress::default().stopped_by(options.stop.clone());
+    progress.go_on()?;
     mesh.check()?;
-    let resources = Resources::unlimited(&Progress::default());
+    let resources = Resources::unlimited(&progress);
     let split = options.split_objects || !mesh.instances.is_empty();
     let mut gatherer = Gatherer::new(&resources, split).rounding(options.round).of_one_mesh();
     // A mesh in memory has no file name.
     gatherer.add_mesh(mesh).map_err(|halt| halt.in_file(Path::new("")))?;
-    let mut output = Output::Memory(Vec::new());
+    let mut output = Output::in_memory(&progress);
     let mut report = bake(gatherer, options, provenance, &mut output, begin)?;
     report.seconds = start.map_or(0.0, |start| start.elapsed().as_secs_f64());
-    let Output::Memory(bytes) = output else { unreachable!("a bake does not move its output") };
+    let Output::Memory { bytes, .. } = output else { unreachable!("a bake does not move its output") };
     Ok((bytes, report))
 }
 

@@ -131,6 +131,9 @@ pub enum BakeError {
         /// The bytes that are free.
         found: u64,
     },
+    /// [`Options::stop`](crate::Options::stop) was set before the bake was done.
+    #[error("expected time for the bake, found it stopped: its flag is set, or its time is over")]
+    Stopped,
     /// The function for build scripts was called outside a build script.
     #[error("expected the environment variable OUT_DIR of a build script, found none")]
     NoOutDir,

@@ -236,6 +236,7 @@ impl RandomAccess<'_> {
                 Ok(())
             }
             Self::File { file, .. } => {
+                progress.go_on_with_io()?;
                 progress.add_input_read(into.len() as u64);
                 read_exact_at(file, into, offset)
             }
@@ -320,6 +321,7 @@ impl<'a> InputReader<'a> {
 
 impl Read for InputReader<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.progress.go_on_with_io()?;
         let count = match &mut self.source {
             Source::File(file) => {
                 let count = file.read(buffer)?;

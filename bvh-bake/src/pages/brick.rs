@@ -137,11 +137,13 @@ fn encode_brick(
         turning::fit(&mut arena, triangles, style.behind.left_out);
     }
     drop(tree);
+    spill.go_on()?;
     let kdop = arena.kdop(0, slabs);
     let plan = plan::plan_brick(&arena, style);
     let places = plan::places(&plan.pages, arena.len());
     let encoder = Encoder { arena: &arena, pages: &plan.pages, places: &places, triangles, style };
     let encoded = encoder.encode();
+    spill.go_on()?;
     let (packets, treelets, children) = (encoded.packets, encoded.treelets, arena.child_count());
     let (mut own, mut placed) = (Vec::new(), Vec::new());
     let rest = arena.rest(&plan.taken, &mut own, |there, here| {

@@ -132,7 +132,7 @@ impl Group {
 }
 
 /// Drops most of the hashes that occur once, namely those that are alone in their bit of the bitmap.
-fn drop_single(hashes: &mut Vec<Hashed>) {
+fn drop_single(hashes: &mut Vec<Hashed>, spill: &Spill) -> Result<(), BakeError> {
     let bits = (hashes.len() * BITS_PER_HASH).next_power_of_two().max(64);
     let bitmap = || (0..bits / 64).map(|_| AtomicU64::new(0)).collect::<Vec<_>>();
     let (once, twice) = (bitmap(), bitmap());
@@ -140,17 +140,26 @@ fn drop_single(hashes: &mut Vec<Hashed>) {
         let bit = hashed.hash() as usize & (bits - 1);
         (bit / 64, 1 << (bit % 64))
     };
-    threads::map(hashes.chunks(TRIANGLES_PER_PART), |hashes| {
+    let marked = threads::map(hashes.chunks(TRIANGLES_PER_PART), |hashes| {
         for (word, bit) in hashes.iter().map(place) {
             if once[word].fetch_or(bit, Relaxed) & bit != 0 {
                 twice[word].fetch_or(bit, Relaxed);
             }
         }
+        spill.go_on()
     });
-    hashes.retain(|hashed| {
-        let (word, bit) = place(hashed);
-        twice[word].load(Relaxed) & bit != 0
-    });
+    marked.into_iter().collect::<Result<(), _>>()?;
+    let mut kept = 0;
+    for start in (0..hashes.len()).step_by(TRIANGLES_PER_PART) {
+        spill.go_on()?;
+        for at in start..hashes.len().min(start + TRIANGLES_PER_PART) {
+            let (word, bit) = place(&hashes[at]);
+            hashes[kept] = hashes[at];
+            kept += usize::from(twice[word].load(Relaxed) & bit != 0);
+        }
+    }
+    hashes.truncate(kept);
+    Ok(())
 }
 
 /// Finds the places of duplicates from the hashes of all triangles, as one bit per triangle, or no bits at all if there
@@ -166,7 +175,7 @@ pub(crate) fn find(
     let mut shared: Vec<u64> = Vec::new();
     let mut last: Option<Hashed> = None;
     if let Some(hashes) = hashes.in_memory() {
-        drop_single(hashes);
+        drop_single(hashes, spill)?;
     }
     hashes.visit(|hashed| {
         if let Some(last) = last.filter(|last| last.hash() == hashed.hash()) {

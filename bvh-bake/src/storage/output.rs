@@ -26,7 +26,7 @@ const MIN_THREAD_BYTES: u64 = 1 << 20;
 
 /// Bytes that are written from the first to the last.
 pub(crate) enum Output {
-    Memory(Vec<u8>),
+    Memory { bytes: Vec<u8>, progress: Progress },
     File(OutputFile),
 }
 
@@ -43,6 +43,11 @@ pub(crate) struct OutputFile {
 }
 
 impl Output {
+    /// Keeps the bytes in memory. They are not counted.
+    pub(crate) fn in_memory(progress: &Progress) -> Self {
+        Self::Memory { bytes: Vec::new(), progress: progress.clone() }
+    }
+
     /// Creates a file beside `path` whose bytes are read back from the system. Bytes written and read are counted.
     pub(crate) fn beside(path: &Path, progress: &Progress) -> Result<Self, BakeError> {
         let (file, path, progress) = (Temporary::beside(path)?, path.to_owned(), progress.clone());
@@ -61,7 +66,7 @@ impl Output {
     /// Returns the number of bytes written.
     pub(crate) fn length(&self) -> u64 {
         match self {
-            Self::Memory(bytes) => bytes.len() as u64,
+            Self::Memory { bytes, .. } => bytes.len() as u64,
             Self::File(file) => file.length,
         }
     }
@@ -69,7 +74,9 @@ impl Output {
     /// Reserves room for the given number of bytes, and expects them as the work of [`Stage::Encode`].
     pub(crate) fn expect(&mut self, length: u64) {
         match self {
-            Self::Memory(bytes) => bytes.reserve_exact((length as usize).saturating_sub(bytes.len())),
+            Self::Memory { bytes, .. } => {
+                bytes.reserve_exact((length as usize).saturating_sub(bytes.len()));
+            }
             Self::File(file) => file.progress.expect(Step::Bake(Stage::Encode), length),
         }
     }
@@ -77,8 +84,12 @@ impl Output {
     /// Adds bytes at the end.
     pub(crate) fn append(&mut self, bytes: Arc<Vec<u8>>) -> Result<(), BakeError> {
         match self {
-            Self::Memory(all) => all.extend_from_slice(&bytes),
+            Self::Memory { bytes: all, progress } => {
+                progress.go_on()?;
+                all.extend_from_slice(&bytes);
+            }
             Self::File(file) => {
+                file.progress.go_on()?;
                 let at = file.length;
                 file.length += bytes.len() as u64;
                 if let Some(kept) = &mut file.kept {
@@ -94,7 +105,7 @@ impl Output {
     /// Replaces the first bytes, after all others have been added, and starts writing to the medium.
     pub(crate) fn replace_first(&mut self, bytes: Vec<u8>) -> Result<(), BakeError> {
         match self {
-            Self::Memory(all) => all[..bytes.len()].copy_from_slice(&bytes),
+            Self::Memory { bytes: all, .. } => all[..bytes.len()].copy_from_slice(&bytes),
             Self::File(file) => {
                 let bytes = Arc::new(bytes);
                 if let Some(kept) = &mut file.kept {
@@ -111,11 +122,12 @@ impl Output {
     /// Waits until the whole file is on the medium, and gives it its final name.
     pub(crate) fn rename(self) -> Result<(), BakeError> {
         match self {
-            Self::Memory(_) => Ok(()),
-            Self::File(OutputFile { file, path, writer, .. }) => {
+            Self::Memory { .. } => Ok(()),
+            Self::File(OutputFile { file, path, writer, progress, .. }) => {
                 if let Some(writer) = writer {
                     writer.finish().map_err(failed(&path, "write"))?;
                 }
+                progress.go_on()?;
                 file.rename(&path)
             }
         }
@@ -124,8 +136,10 @@ impl Output {
     /// Returns a source that reads the written bytes.
     pub(crate) fn source(&self) -> OutputSource<'_> {
         match self {
-            Self::Memory(bytes) => OutputSource::Memory(bytes),
-            Self::File(OutputFile { kept: Some(pieces), .. }) => OutputSource::Kept(pieces),
+            Self::Memory { bytes, progress } => OutputSource::Memory(bytes, progress),
+            Self::File(OutputFile { kept: Some(pieces), progress, .. }) => {
+                OutputSource::Kept(pieces, progress)
+            }
             Self::File(OutputFile { file, path, length, progress, .. }) => {
                 OutputSource::File { file: file.file(), path, length: *length, progress }
             }
@@ -138,7 +152,7 @@ impl OutputFile {
     /// they come.
     fn start_writer(&mut self) -> Result<(), BakeError> {
         if self.writer.is_none() && self.length >= MIN_THREAD_BYTES {
-            self.writer = match Writer::start(self.file.file()) {
+            self.writer = match Writer::start(self.file.file(), &self.progress) {
                 Err(error) if error.kind() == io::ErrorKind::Unsupported => None,
                 started => Some(started.map_err(failed(&self.path, "create"))?),
             };
@@ -168,11 +182,11 @@ struct Writer {
 }
 
 impl Writer {
-    fn start(file: &File) -> io::Result<Self> {
-        let file = file.try_clone()?;
+    fn start(file: &File, progress: &Progress) -> io::Result<Self> {
+        let (file, progress) = (file.try_clone()?, progress.clone());
         let (sender, receiver) = channel();
-        let thread =
-            thread::Builder::new().name("output".into()).spawn(move || write_all(&file, receiver))?;
+        let write = move || write_all(&file, receiver, &progress);
+        let thread = thread::Builder::new().name("output".into()).spawn(write)?;
         Ok(Self { sender: Some(sender), thread })
     }
 
@@ -196,8 +210,9 @@ impl Writer {
     }
 }
 
-fn write_all(file: &File, receiver: Receiver<(u64, Arc<Vec<u8>>)>) -> io::Result<()> {
+fn write_all(file: &File, receiver: Receiver<(u64, Arc<Vec<u8>>)>, progress: &Progress) -> io::Result<()> {
     for (at, bytes) in receiver {
+        progress.go_on_with_io()?;
         write_all_at(file, &bytes, at)?;
     }
     file.sync_data()
@@ -256,8 +271,8 @@ impl Pieces {
 /// The bytes of a file, read piece by piece.
 #[derive(Clone, Copy)]
 pub(crate) enum OutputSource<'a> {
-    Memory(&'a [u8]),
-    Kept(&'a Pieces),
+    Memory(&'a [u8], &'a Progress),
+    Kept(&'a Pieces, &'a Progress),
     File { file: &'a File, path: &'a Path, length: u64, progress: &'a Progress },
 }
 
@@ -266,17 +281,19 @@ impl Source for OutputSource<'_> {
 
     fn length(&self) -> u64 {
         match self {
-            Self::Memory(bytes) => bytes.len() as u64,
-            Self::Kept(pieces) => pieces.length() as u64,
+            Self::Memory(bytes, _) => bytes.len() as u64,
+            Self::Kept(pieces, _) => pieces.length() as u64,
             Self::File { length, .. } => *length,
         }
     }
 
     fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, BakeError> {
+        let (Self::Memory(_, progress) | Self::Kept(_, progress) | Self::File { progress, .. }) = self;
+        progress.go_on()?;
         match self {
-            Self::Memory(bytes) => Ok(Cow::Borrowed(&bytes[range])),
-            Self::Kept(pieces) => Ok(pieces.read(range)),
-            Self::File { file, path, progress, .. } => {
+            Self::Memory(bytes, _) => Ok(Cow::Borrowed(&bytes[range])),
+            Self::Kept(pieces, _) => Ok(pieces.read(range)),
+            Self::File { file, path, .. } => {
                 progress.add_output_read(range.len() as u64);
                 let mut bytes = vec![0; range.len()];
                 read_exact_at(file, &mut bytes, range.start as u64)

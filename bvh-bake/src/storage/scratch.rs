@@ -25,7 +25,7 @@ pub(crate) struct Scratch {
     /// The most bytes of pieces that may be in memory.
     allowance: u64,
     kept: AtomicU64,
-    /// Counts the bytes that go through files.
+    /// Counts the bytes that go through files, and tells when the bake has to stop.
     progress: Progress,
 }
 
@@ -81,11 +81,17 @@ pub(crate) struct Spill {
 }
 
 impl Spill {
+    /// Returns an error if the bake has to stop.
+    pub(crate) fn go_on(&self) -> Result<(), BakeError> {
+        self.scratch.progress.go_on()
+    }
+
     /// Stores a piece.
     pub(crate) fn put<T: Pod>(&self, data: Vec<T>) -> Result<Piece<T>, BakeError> {
+        self.go_on()?;
         let bytes = size_of_val(&data[..]) as u64;
         if let Some(lease) = self.scratch.lease(bytes) {
-            return Ok(Piece::Memory { data, _lease: lease });
+            return Ok(Piece::Memory { data, lease });
         }
         let count = data.len();
         let file = self.file()?;
@@ -107,7 +113,7 @@ impl Spill {
 
 /// A stored piece of records.
 pub(crate) enum Piece<T> {
-    Memory { data: Vec<T>, _lease: Lease },
+    Memory { data: Vec<T>, lease: Lease },
     File { file: Arc<ScratchFile>, offset: u64, count: usize },
 }
 
@@ -130,7 +136,10 @@ impl<T: Pod> Piece<T> {
     /// Returns a range of the records.
     pub(crate) fn range(&self, range: Range<usize>) -> Result<Cow<'_, [T]>, BakeError> {
         match self {
-            Self::Memory { data, .. } => Ok(Cow::Borrowed(&data[range])),
+            Self::Memory { data, lease } => {
+                lease.scratch.progress.go_on()?;
+                Ok(Cow::Borrowed(&data[range]))
+            }
             Self::File { file, offset, .. } => {
                 let mut data = vec![T::zeroed(); range.len()];
                 let at = offset + (range.start * size_of::<T>()) as u64;
@@ -148,7 +157,10 @@ impl<T: Pod> Piece<T> {
     /// Returns all records and consumes the piece.
     pub(crate) fn take(self) -> Result<Vec<T>, BakeError> {
         match self {
-            Self::Memory { data, .. } => Ok(data),
+            Self::Memory { data, lease } => {
+                lease.scratch.progress.go_on()?;
+                Ok(data)
+            }
             file => Ok(file.all()?.into_owned()),
         }
     }

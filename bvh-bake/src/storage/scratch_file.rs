@@ -41,6 +41,7 @@ impl ScratchFile {
 
     /// Reads bytes that were written.
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), BakeError> {
+        self.progress.go_on()?;
         self.progress.add_scratch_read(bytes.len() as u64);
         read_exact_at(self.temporary.file(), bytes, offset)
             .map_err(|error| failed(&self.directory, "read scratch data in it", error))

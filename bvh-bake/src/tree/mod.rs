@@ -134,6 +134,7 @@ impl Bricks {
         let make = |number: usize| {
             let brick = locked(&bricks[number]).take().expect("each brick is built once");
             let (tree, triangles) = builder.tree_of_brick(brick)?;
+            resources.progress.go_on()?;
             let done = || resources.progress.add(Step::Bake(Stage::Build), triangles.len() as u64);
             done();
             let made = make(number, tree, &triangles)?;

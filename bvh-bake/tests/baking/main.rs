@@ -8,6 +8,7 @@ mod hull;
 mod open_edges;
 mod progress;
 mod rounding;
+mod stopped;
 mod stored;
 mod topology;
 mod verify;

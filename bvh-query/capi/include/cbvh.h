@@ -103,7 +103,7 @@ enum {
     CBVH_CALLBACK_FAILED = 10,
     /* A defect of this library. The handle that was in use can only be freed. Please report it. */
     CBVH_INTERNAL = 11,
-    /* The flag of the querier, scene or robot was set before there was an answer: see cbvh_stop_new. */
+    /* The flag of the querier, scene, robot or bake was set, or its time was over, before there was an answer: see cbvh_stop_new. */
     CBVH_STOPPED = 12
 };
 
@@ -129,7 +129,7 @@ typedef struct cbvh_path { uint64_t id; } cbvh_path;
 typedef struct cbvh_scene { uint64_t id; } cbvh_scene;
 /* A robot among obstacles. */
 typedef struct cbvh_robot { uint64_t id; } cbvh_robot;
-/* A flag that stops questions. */
+/* A flag that stops questions and bakes. */
 typedef struct cbvh_stop { uint64_t id; } cbvh_stop;
 
 /* ----------------------------------------------------------------------------------------------------------- poses */
@@ -325,6 +325,9 @@ typedef struct cbvh_bake_options {
     /* Moves each vertex of an object to the first vertex within this distance of it, in mesh units, which closes seams that are
      * open by rounding errors; 0 leaves vertices where they are. At most the diagonal of the object's box. */
     double weld;
+    /* What stops the bake: see cbvh_stop_new. It then ends with CBVH_STOPPED, most often within a tenth of a second, and leaves nothing
+     * behind; an output that was there stays as it was. The handle may be freed when the bake has begun. 0 for nothing. */
+    cbvh_stop stop;
 } cbvh_bake_options;
 
 /* Bakes triangles in memory: 3 numbers per vertex, 3 vertices per face. Triangles are numbered in their order. It takes
@@ -422,12 +425,16 @@ cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
 cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
 
 /* Makes a flag that is not set. Any number of queriers, scenes and robots may have it. While it is set, each of their
- * questions ends with CBVH_STOPPED: one that is under way within a millisecond or so, and a new one at once. A flag that is
- * not set affects no answer. */
+ * questions ends with CBVH_STOPPED: one that is under way within a millisecond or so, and a new one at once. Bakes may have it, too
+ * (cbvh_bake_options). A flag that is not set affects no answer and no file. */
 cbvh_status cbvh_stop_new(cbvh_stop *stop);
 /* Sets a flag, on any thread, but not in a signal handler. */
 cbvh_status cbvh_stop_set(cbvh_stop stop);
-/* Clears a flag. Questions that begin afterwards are answered. */
+/* Limits questions and bakes in time: the flag counts as set from so many seconds after this call on. At least 0, which sets
+ * it at once; infinity is no limit. A later call replaces the time, and a flag that cbvh_stop_set has set stays set. Each
+ * query then reads the clock, which takes some 30 nanoseconds. */
+cbvh_status cbvh_stop_set_after(cbvh_stop stop, double seconds);
+/* Clears a flag, and takes its time away. Questions that begin afterwards are answered. */
 cbvh_status cbvh_stop_clear(cbvh_stop stop);
 /* Frees the handle of a flag. Queriers, scenes and robots keep the flag that they were given, set or not. */
 cbvh_status cbvh_stop_free(cbvh_stop stop);

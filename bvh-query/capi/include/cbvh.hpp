@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <atomic>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -267,6 +268,8 @@ struct BakeOptions {
     bool drop_nan = false;
     double radius = 0;
     double weld = 0;
+    /// What stops the bake: raw() of a Stop, which has to live until the bake begins.
+    cbvh_stop stop{0};
 
     /// The texts stay those of this object.
     cbvh_bake_options raw() const {
@@ -292,6 +295,7 @@ struct BakeOptions {
         options.drop_nan = drop_nan;
         options.radius = radius;
         options.weld = weld;
+        options.stop = stop;
         return options;
     }
 };
@@ -748,7 +752,7 @@ private:
     detail::Handle<cbvh_path, cbvh_path_free> handle_;
 };
 
-/// A flag that stops the questions of those that have it: see cbvh_stop_new. Any thread may set and clear it.
+/// A flag that stops the questions of those that have it, and bakes (BakeOptions): see cbvh_stop_new. Any thread may set and clear it.
 class Stop {
 public:
     Stop() {
@@ -758,6 +762,11 @@ public:
     }
     cbvh_stop raw() const noexcept { return handle_.raw(); }
     void set() const { check(cbvh_stop_set(raw())); }
+    /// Sets the flag once so much time has passed from now, such as std::chrono::milliseconds(100): see cbvh_stop_set_after.
+    template <typename Rep, typename Period>
+    void set_after(const std::chrono::duration<Rep, Period> &time) const {
+        check(cbvh_stop_set_after(raw(), std::chrono::duration<double>(time).count()));
+    }
     void clear() const { check(cbvh_stop_clear(raw())); }
 
 private:

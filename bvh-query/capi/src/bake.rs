@@ -6,6 +6,7 @@ use crate::entry::{entry, hand_out};
 use crate::input::{each, flag, optional, options, path, pointers, text};
 use crate::output::{self, One};
 use crate::status::{Failure, Status};
+use crate::stops;
 use crate::types::{BakeChoices, MeshHandle};
 use bvh_bake::mesh::Mesh;
 use bvh_bake::{
@@ -89,7 +90,8 @@ unsafe fn choices(pointer: *const BakeChoices) -> Result<Choices, Failure> {
         .topology(!flag("options.no_topology", given.no_topology)?)
         .solid(flag("options.solid", given.solid)?)
         .drop_nan(flag("options.drop_nan", given.drop_nan)?)
-        .radius(given.radius);
+        .radius(given.radius)
+        .stop(stops::in_argument("options.stop", given.stop)?);
     // SAFETY: as above.
     let scratch = optional(given.scratch, |folder| unsafe { path("options.scratch", folder) })?;
     let max_memory = Some(given.max_memory).filter(|&bytes| bytes > 0);

@@ -78,6 +78,7 @@ fn of_bake(error: &BakeError) -> Status {
         BakeError::Read(ReadError::Limit { .. }) => Status::Limit,
         BakeError::Memory { .. } | BakeError::Limit(_) => Status::Limit,
         BakeError::Unproved(_) => Status::Internal,
+        BakeError::Stopped => Status::Stopped,
         _ => Status::BakeFailed,
     }
 }

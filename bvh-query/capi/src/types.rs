@@ -80,6 +80,7 @@ structures! {
         drop_nan: i32,
         round: *const c_char,
         weld: f64,
+        stop: StopHandle,
     }
     RobotChoices {
         size: usize,

@@ -53,6 +53,7 @@ static void handles(void) {
     const cbvh_stop no_stop = {0}, a_querier = {querier.id};
     FAILS(cbvh_stop_set(no_stop), CBVH_INVALID_HANDLE, "stop: expected the handle of an open stop, found 0");
     FAILS(cbvh_stop_clear(no_stop), CBVH_INVALID_HANDLE, "stop: ");
+    FAILS(cbvh_stop_set_after(a_querier, 1), CBVH_INVALID_HANDLE, "found the handle of a querier");
     FAILS(cbvh_querier_set_stop(querier, a_querier), CBVH_INVALID_HANDLE, "stop: expected the handle of an open stop");
     FAILS(cbvh_scene_set_stop(scene, a_querier), CBVH_INVALID_HANDLE, "found the handle of a querier");
     FAILS(cbvh_stop_new(NULL), CBVH_INVALID_ARGUMENT, "stop: ");

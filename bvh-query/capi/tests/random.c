@@ -314,7 +314,8 @@ int main(int argument_count, char **arguments) {
                                     : cbvh_robot_motions(o, in, below(4), joint_count, n, options, out); break;
         case 113: status = below(2) ? cbvh_mesh_open_edges(a, out, capacity, &count) : cbvh_mesh_open_edge_counts(a, out); break;
         /* No flag is set, so that questions have answers. */
-        case 115: status = below(2) ? cbvh_stop_new((cbvh_stop *)&made) : cbvh_stop_clear(t); break;
+        case 115: status = below(2) ? cbvh_stop_new((cbvh_stop *)&made)
+                                : below(2) ? cbvh_stop_clear(t) : cbvh_stop_set_after(t, below(2) ? 1e6 : -1 - fabs(x)); break;
         case 116: status = below(3) == 0 ? cbvh_querier_set_stop(q, t)
                                 : below(2) ? cbvh_scene_set_stop(s, t) : cbvh_robot_set_stop(o, t); break;
         case 114: status = cbvh_signed_distances(q, a, b, in, n, options, out); break;

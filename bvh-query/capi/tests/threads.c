@@ -1,6 +1,6 @@
 /* Threads: several with a querier each and one mesh give the same bits; one querier for two is refused; a mesh, a path
  * and a scene may be freed while others use them; many look at a scene; functions of paths ask by themselves; a scene is
- * changed while others ask, and each answer is that of one scene; a flag stops questions that other threads ask. */
+ * changed while others ask, and each answer is that of one scene; a flag stops questions that other threads ask, and bakes. */
 #include "support.h"
 #include <pthread.h>
 #include <time.h>
@@ -241,6 +241,52 @@ static void *set_soon(void *unused) {
     return unused;
 }
 
+static double seconds(void) {
+    struct timespec now;
+    CHECK(clock_gettime(CLOCK_MONOTONIC, &now) == 0);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* A bake under way ends with the flag or when its time is over, and gives no mesh. */
+static void bakes_stop(void) {
+    enum { SIDE = 600 };
+    double *const vertices = malloc(3 * sizeof(double) * SIDE * SIDE);
+    uint32_t *const faces = malloc(6 * sizeof(uint32_t) * (SIDE - 1) * (SIDE - 1));
+    size_t face_count = 0;
+    CHECK(vertices != NULL && faces != NULL);
+    for (uint32_t k = 0; k < SIDE * SIDE; k++) {
+        const uint32_t x = k % SIDE, y = k / SIDE;
+        vertices[3 * k] = x;
+        vertices[3 * k + 1] = y;
+        vertices[3 * k + 2] = (x * x + y * y) % 7;
+        if (x + 1 < SIDE && y + 1 < SIDE) {
+            const uint32_t corners[6] = {k, k + 1, k + SIDE, k + 1, k + SIDE + 1, k + SIDE};
+            memcpy(faces + 3 * face_count, corners, sizeof corners);
+            face_count += 2;
+        }
+    }
+    const cbvh_bake_options options = {.size = sizeof options, .stop = stop};
+    const cbvh_bake_options wrong = {.size = sizeof wrong, .stop = {mesh.id}};
+    const cbvh_bake_options quick = {.size = sizeof quick, .effort = "quick", .stop = stop};
+    cbvh_mesh made = {7};
+    pthread_t thread;
+    FAILS(cbvh_bake(vertices, SIDE * SIDE, faces, face_count, &wrong, &made), CBVH_INVALID_HANDLE,
+          "options.stop: expected the handle of an open stop, found the handle of a mesh");
+    CHECK(pthread_create(&thread, NULL, set_soon, NULL) == 0);
+    FAILS(cbvh_bake(vertices, SIDE * SIDE, faces, face_count, &options, &made), CBVH_STOPPED, "found it stopped");
+    CHECK(made.id == 0);
+    CHECK(pthread_join(thread, NULL) == 0);
+    FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &quick, &made), CBVH_STOPPED, "");
+    OK(cbvh_stop_clear(stop));
+    OK(cbvh_stop_set_after(stop, 0.02));
+    FAILS(cbvh_bake(vertices, SIDE * SIDE, faces, face_count, &quick, &made), CBVH_STOPPED, "its time is over");
+    OK(cbvh_stop_clear(stop));
+    OK(cbvh_bake(vertices, SIDE * SIDE, faces, face_count, &quick, &made));
+    OK(cbvh_mesh_free(made));
+    free(vertices);
+    free(faces);
+}
+
 static void stops(void) {
     /* Triangles that all contain a point, each beside the others: all pairs touch. */
     enum { TRIANGLES = 4096, INSTANCES = 3 };
@@ -296,6 +342,44 @@ static void stops(void) {
     }
     CHECK(cbvh_contacts(querier, fan, fan, &here, 1, NULL, NULL, 0, &count) == CBVH_BUFFER_TOO_SMALL);
     CHECK(count == (size_t)TRIANGLES * TRIANGLES);
+    /* After a time: a question under way on one core and on all, and new ones until the flag is cleared. */
+    for (int32_t parallel = 0; parallel < 2; parallel++) {
+        OK(cbvh_querier_set_parallel(querier, parallel));
+        OK(cbvh_scene_set_parallel(many, parallel));
+        const double began = seconds();
+        OK(cbvh_stop_set_after(stop, 0.02));
+        FAILS(cbvh_contacts(querier, fan, fan, &here, 1, NULL, NULL, 0, &count), CBVH_STOPPED, "its time is over");
+        CHECK(seconds() - began >= 0.02);
+        FAILS(cbvh_collide(querier, mesh, mesh, poses, 1, &answer), CBVH_STOPPED, "");
+        FAILS(cbvh_scene_collide(many, &answer), CBVH_STOPPED, "");
+        /* The last call counts, and what is refused changes nothing. */
+        OK(cbvh_stop_set_after(stop, 1000));
+        FAILS(cbvh_stop_set_after(stop, -1e-300), CBVH_INVALID_ARGUMENT, "seconds: expected at least 0, found -1e-300");
+        FAILS(cbvh_stop_set_after(stop, NAN), CBVH_INVALID_ARGUMENT, "seconds: expected at least 0, found NaN");
+        FAILS(cbvh_stop_set_after(stop, -INFINITY), CBVH_INVALID_ARGUMENT, "seconds: expected at least 0, found -inf");
+        OK(cbvh_collide(querier, mesh, mesh, poses, 1, &answer));
+        OK(cbvh_stop_set_after(stop, 0.02));
+        FAILS(cbvh_scene_contacts(many, NULL, 0, &count), CBVH_STOPPED, "");
+        OK(cbvh_stop_set_after(stop, INFINITY));
+        OK(cbvh_scene_collide(many, &answer));
+        OK(cbvh_stop_set_after(stop, 0));
+        FAILS(cbvh_scene_collide(many, &answer), CBVH_STOPPED, "");
+        OK(cbvh_stop_set_after(stop, 1e300));
+        OK(cbvh_scene_collide(many, &answer));
+        /* A flag that is set stays set. */
+        OK(cbvh_stop_set(stop));
+        OK(cbvh_stop_set_after(stop, 1000));
+        FAILS(cbvh_scene_collide(many, &answer), CBVH_STOPPED, "");
+        OK(cbvh_stop_set_after(stop, -0.0));
+        OK(cbvh_stop_clear(stop));
+        OK(cbvh_scene_collide(many, &answer));
+        cbvh_distance_answer answers[POSES];
+        OK(cbvh_stop_set_after(stop, 1000));
+        OK(cbvh_distances(querier, mesh, mesh, poses, POSES, NULL, answers));
+        CHECK(memcmp(answers, expected, sizeof expected) == 0);
+    }
+    OK(cbvh_stop_clear(stop));
+    bakes_stop();
     /* Without a flag, or with one whose handle is gone. */
     OK(cbvh_stop_set(stop));
     OK(cbvh_scene_set_stop(many, no_stop));

@@ -2,6 +2,7 @@
 #include <cbvh.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -558,7 +559,7 @@ void robots(const std::string &urdf) {
 
 } // namespace
 
-/// A flag stops questions of all who have it, until it is cleared.
+/// A flag stops questions of all who have it, by hand and after a time, until it is cleared.
 static void stops(const std::string &urdf) {
     const cbvh::Mesh mesh = cube(1);
     cbvh::Querier querier;
@@ -582,6 +583,22 @@ static void stops(const std::string &urdf) {
     CHECK(querier.collide(mesh, mesh, cbvh::Pose()));
     stop.clear();
     CHECK(scene.collide() && robot.collide(up) == touches);
+    stop.set_after(std::chrono::hours(1));
+    CHECK(scene.collide() && robot.collide(up) == touches);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(5);
+    stop.set_after(std::chrono::milliseconds(5));
+    while (std::chrono::steady_clock::now() < end + std::chrono::milliseconds(1)) {
+    }
+    FAILS(scene.collide(), CBVH_STOPPED, "its time is over");
+    FAILS(robot.collide(up), CBVH_STOPPED, "");
+    FAILS(stop.set_after(std::chrono::seconds(-1)), CBVH_INVALID_ARGUMENT, "seconds: expected at least 0, found -1");
+    FAILS(stop.set_after(std::chrono::duration<float>(std::nanf(""))), CBVH_INVALID_ARGUMENT, "found NaN");
+    stop.set_after(std::chrono::hours::max());
+    CHECK(scene.collide());
+    stop.set_after(std::chrono::nanoseconds::zero());
+    FAILS(scene.collide(), CBVH_STOPPED, "");
+    stop.clear();
+    CHECK(scene.collide());
     stop.set();
     scene.set_stop(nullptr);
     robot.set_stop(nullptr);

@@ -78,8 +78,8 @@ pub(crate) fn bake(
     let [_, 3] = *faces.shape() else { return Err(shape_error("faces", "(F, 3)", faces.shape())) };
     let faces = faces.as_slice()?.as_chunks::<3>().0.to_vec();
     let vertices = rows(vertices, "vertices")?.rows;
-    let bake = || to_bytes(&Triangles::from_triangles(vertices, faces), &options);
-    let (bytes, _) = detached(py, || on_pool(|_| bake()))?.map_err(bake_error)?;
+    let bake = |stop| to_bytes(&Triangles::from_triangles(vertices, faces), &options.stop(Some(stop)));
+    let (bytes, _) = detached(py, || on_pool(bake))?.map_err(bake_error)?;
     let opened = Bvh::from_bytes(bytes);
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
 }
@@ -95,8 +95,11 @@ pub(crate) fn bake_files(
     force: bool,
 ) -> PyResult<Vec<String>> {
     let options = options.read()?;
-    let bake = || FileBake::new(inputs, output).options(options).max_memory(max_memory).force(force).run();
-    let outcome = detached(py, || on_pool(|_| bake()))?.map_err(bake_error)?;
+    let bake = |stop| {
+        let bake = FileBake::new(inputs, output).options(options.stop(Some(stop)));
+        bake.max_memory(max_memory).force(force).run()
+    };
+    let outcome = detached(py, || on_pool(bake))?.map_err(bake_error)?;
     Ok(match outcome {
         Outcome::Baked(report) => report.warnings,
         Outcome::UpToDate(_) => Vec::new(),

@@ -14,7 +14,7 @@ create_exception!(
     cbvh,
     StoppedError,
     PyRuntimeError,
-    "A question was stopped before it had an answer: see Stop."
+    "A question was stopped before it had an answer, or a bake before it was done: see Stop."
 );
 
 /// The exception of a file that cannot be opened. An error of the system keeps its class, such as `FileNotFoundError`.
@@ -69,6 +69,7 @@ pub(crate) fn bake_error(error: bvh_bake::BakeError) -> PyErr {
         Error::Read(ReadError::Io { path, source })
         | Error::Write { path, source, .. }
         | Error::Scratch { directory: path, source, .. } => system_error(path, source, message),
+        Error::Stopped => StoppedError::new_err("expected time for the bake, found it stopped"),
         _ => BakeError::new_err(message),
     }
 }

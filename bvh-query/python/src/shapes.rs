@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 
 fn baked(py: Python<'_>, core: Result<Triangles, ShapeError>) -> PyResult<Mesh> {
     let core = core.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    let (bytes, _) =
-        detached(py, || on_pool(|_| to_bytes(&core, &Options::default())))?.map_err(bake_error)?;
+    let bake = |stop| to_bytes(&core, &Options::default().stop(Some(stop)));
+    let (bytes, _) = detached(py, || on_pool(bake))?.map_err(bake_error)?;
     let opened = Bvh::from_bytes(bytes);
     opened.map(Mesh::new).map_err(|error| BakeError::new_err(error.to_string()))
 }

@@ -1,7 +1,9 @@
-"""Tests of what stops questions: flags, times and signals, before they begin and while they run."""
+"""Tests of what stops questions and bakes: flags, times and signals, before they begin and while they run."""
 
 import os
+import pathlib
 import signal
+import tempfile
 import threading
 import time
 import unittest
@@ -22,6 +24,14 @@ def fan(count):
     """Triangles that all contain a point, each beside the others: of two such meshes, all pairs touch."""
     corners = np.array([[[0, 0, 0], [1, 0, 0], [k, 1, 0]] for k in range(count)], float)
     return cbvh.bake(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+
+
+def sheet(side):
+    """The vertices and faces of a surface over a grid, which takes about a microsecond per face to bake."""
+    x, y = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
+    first = (x * side + y)[:-1, :-1].ravel()
+    faces = np.concatenate([[first, first + 1, first + side], [first + 1, first + side + 1, first + side]], axis=1).T
+    return np.stack([x, y, (x * x + y * y) % 7], axis=-1).reshape(-1, 3).astype(float), faces.astype(np.uint32)
 
 
 class Questions:
@@ -207,6 +217,58 @@ class Stopping(unittest.TestCase):
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, before)
+
+    def test_bakes_are_stopped_and_leave_nothing(self):
+        arrays = sheet(1200)
+        with tempfile.TemporaryDirectory() as folder:
+            mesh, output = pathlib.Path(folder, "sheet.stl"), pathlib.Path(folder, "sheet.cbvh")
+            corners = arrays[0][arrays[1]].astype("<f4")
+            facets = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+            facets["corners"] = corners
+            mesh.write_bytes(bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
+            output.write_bytes(b"old")
+
+            def in_files(**options):
+                return cbvh.bake_files(mesh, output, force=True, **options)
+
+            bakes = [
+                lambda: cbvh.bake(*arrays),
+                lambda: cbvh.bake(*arrays, effort="quick"),
+                lambda: cbvh.cloud(arrays[0], 0.1),
+                in_files,
+                lambda: in_files(max_memory=150 << 20),
+            ]
+            for number, bake in enumerate(bakes):
+                for is_signal in [False] + [True] * hasattr(signal, "pthread_kill"):
+                    with self.subTest(number=number, is_signal=is_signal):
+                        when = []
+
+                        def interrupt(when=when):
+                            when.append(time.monotonic())
+                            os.kill(os.getpid(), signal.SIGINT)
+
+                        if is_signal:
+                            timer = threading.Timer(0.1, interrupt)
+                            timer.start()
+                            with self.assertRaises(KeyboardInterrupt):
+                                bake()
+                            timer.join()
+                        else:
+                            when.append(time.monotonic() + 0.1)
+                            with Stop(after=0.1), self.assertRaisesRegex(StoppedError, "found it stopped"):
+                                bake()
+                        self.assertLess(time.monotonic() - when[0], SOON)
+                        self.assertEqual(output.read_bytes(), b"old")
+                        self.assertEqual(sorted(os.listdir(folder)), ["sheet.cbvh", "sheet.stl"])
+            stop = Stop()
+            stop.set()
+            with stop:
+                for bake in [lambda: cbvh.bake(*cube()), lambda: cbvh.box([1, 1, 1]), in_files]:
+                    with self.assertRaises(StoppedError):
+                        bake()
+                stop.clear()
+                self.assertEqual(cbvh.bake(*cube()).triangle_count, 12)
+                self.assertEqual(in_files(effort="quick").triangle_count, len(facets))
 
     def test_misuse(self):
         check_errors(

@@ -25,7 +25,7 @@ use crate::query::probe::relation::Relation;
 use crate::query::querier::Querier;
 use crate::query::regions::ContactRegions;
 use crate::query::tracker::Tracker;
-use crate::stop::Stop;
+use bvh_format::Stop;
 use std::sync::Arc;
 
 /// Asks about many poses or motions of one pair of meshes, on all threads of the rayon pool it is called in.

@@ -9,7 +9,7 @@
 
 use crate::isa::Backend;
 use crate::query::querier::Querier;
-use crate::stop::Stop;
+use bvh_format::Stop;
 use std::fmt;
 #[cfg(feature = "parallel")]
 use std::ops::Range;

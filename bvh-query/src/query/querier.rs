@@ -10,9 +10,9 @@ use crate::query::pair_search::BoundedPair;
 use crate::query::probe::bounded::BoundedTriangle;
 use crate::query::probe::placed::IntoObject;
 use crate::query::stats::QueryStats;
-use crate::stop::Stop;
 use crate::traverse::budget::Budget;
 use crate::traverse::walk_memory::WalkMemory;
+use bvh_format::Stop;
 use std::sync::Arc;
 
 /// Asks questions about two meshes.

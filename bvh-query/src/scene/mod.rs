@@ -38,7 +38,7 @@ use crate::file::shape::check_radius;
 use crate::isa::{Backend, BackendError};
 use crate::pose::Pose;
 use crate::query::stats::QueryStats;
-use crate::stop::Stop;
+use bvh_format::Stop;
 use contents::{Contents, check_world};
 use instance::Instance;
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 //! the flag is read when a portion is used up. So a visit costs as much with a flag as without.
 
 use crate::error::QueryError;
-use crate::stop::Stop;
+use bvh_format::Stop;
 use std::sync::Arc;
 
 /// The number of visits that a look ahead may make beyond those of the query. They cost less than finding out whether

@@ -4,8 +4,8 @@
 use crate::common::shapes::{cube, moved, soup, torus};
 use crate::common::{Random, Triangle, backends, baked, random_pose, translation};
 use bvh_query::{
-    ClashOptions, DistanceOptions, Motion, MotionOptions, OwnedShape, PatchOptions, PenetrationOptions, Pose,
-    Querier, QueryError, Ray, Scene, SceneError, Tracker,
+    Bvh, ClashOptions, DistanceOptions, Motion, MotionOptions, OwnedShape, PatchOptions, PenetrationOptions,
+    Pose, Querier, QueryError, Ray, Scene, SceneError, Tracker,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -164,6 +164,24 @@ fn batches_are_stopped() {
             assert!(probes.first_hits(&rays).is_ok());
         });
     }
+}
+
+#[test]
+fn one_flag_stops_bakes_and_queries() {
+    let mesh = bvh_bake::shapes::block([2.0; 3]).unwrap();
+    let stop = flag(false);
+    let options = bvh_bake::Options::default().stop(Some(stop.clone()));
+    let (bytes, _) = bvh_bake::to_bytes(&mesh, &options).unwrap();
+    let block = Bvh::from_bytes(bytes).unwrap();
+    let mut querier = Querier::new().unwrap();
+    querier.set_stop(options.stop.clone());
+    assert_eq!(querier.collide(&block, &block, &Pose::IDENTITY), Ok(true));
+    stop.store(true, Ordering::Relaxed);
+    assert!(matches!(bvh_bake::to_bytes(&mesh, &options), Err(bvh_bake::BakeError::Stopped)));
+    assert_eq!(querier.collide(&block, &block, &Pose::IDENTITY), Err(QueryError::Stopped));
+    // Flags are equal only to themselves.
+    assert_eq!(options, options.clone());
+    assert_ne!(options, bvh_bake::Options::default().stop(Some(flag(true))));
 }
 
 #[test]

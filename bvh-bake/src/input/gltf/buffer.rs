@@ -66,7 +66,7 @@ impl Bytes<'_> {
             }
             Found::File(file) => {
                 self.progress.add_input_read(into.len() as u64);
-                read_exact_at(file, into, offset)
+                self.progress.go_on_with_io().and_then(|()| read_exact_at(file, into, offset))
             }
         };
         read.map_err(|source| Fault::Io { path: self.path.to_path_buf(), source })

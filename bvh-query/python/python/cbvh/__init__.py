@@ -48,12 +48,13 @@ about a `Scene` as it is when the question begins, and a path of your own is cal
 are copied before a question runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
 enables the lock when it imports this module.
 
-**Stopping.** In the block of a `Stop`, questions end when another thread sets its flag, or after a time. Ctrl-C ends questions of the main
-thread, within about a tenth of a second.
+**Stopping.** In the block of a `Stop`, questions and bakes end when another thread sets its flag, or after a time. Ctrl-C ends those of the
+main thread, within about a tenth of a second. A bake that is stopped leaves no file behind.
 
 Errors are exceptions: ``ValueError`` for invalid arguments, ``TypeError`` for arguments of a wrong type, ``KeyError``
 for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError`` for files that
-are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked, ``StoppedError`` for questions that a `Stop` ends.
+are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked, ``StoppedError`` for questions and bakes that a
+`Stop` ends.
 """
 
 from ._answers import (

@@ -146,7 +146,7 @@ def bake_files(
     variable ``RAYON_NUM_THREADS`` sets the number of threads of the module, for bakes and for ``parallel=True``; the
     default is the number of cores. Warns with `BakeWarning` of what the readers did that the authors of the files may
     not expect, such as bytes, points or animations that they left out. Raises OSError if the system refuses a file, and BakeError
-    if a mesh cannot be baked.
+    if a mesh cannot be baked. After these, and after Ctrl-C or a `Stop`, the output is what it was before, and no other file is left.
     """
     if isinstance(inputs, (str, bytes, os.PathLike)):
         inputs = [inputs]

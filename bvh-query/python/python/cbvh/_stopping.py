@@ -1,4 +1,4 @@
-"""What stops questions that take long."""
+"""What stops questions and bakes that take long."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from . import _cbvh
 
 
 class Stop:
-    """Stops questions of the thread that is in its block, by a flag that any thread may set, or after a time.
+    """Stops questions and bakes of the thread that is in its block, by a flag that any thread may set, or after a time.
 
     >>> stop = cbvh.Stop()                                                   # doctest: +SKIP
     >>> button.on_click(stop.set)                                            # doctest: +SKIP
@@ -21,9 +21,11 @@ class Stop:
     >>> with cbvh.Stop(after=0.1):                                           # doctest: +SKIP
     ...     free = robot.is_free(starts, goals)
 
+    A bake ends within a tenth of a second or so, and leaves no file behind; an output that was there stays as it was.
+
     Blocks may be nested, and each of them stops. A call about many poses has no answer if it is stopped. A flag that is not set affects no
-    answer. Making meshes and reading robots is not stopped, and neither are the first check of the topology of a file and the boxes that
-    a mesh gets for its rays.
+    answer. Reading robots is not stopped, and neither are the first check of the topology of a file and the boxes that a mesh gets for
+    its rays.
     """
 
     __slots__ = ("_flag",)

@@ -15,7 +15,7 @@ use crate::query::probe::ray::{All, Any, First, Ray, RayHit, Scaled};
 use crate::query::probe::segment::{MeetsSegment, check_margin};
 use crate::query::probe::side::{Side, SignedPointDistance};
 use crate::query::querier::Querier;
-use crate::stop::Stop;
+use bvh_format::Stop;
 use std::convert::Infallible;
 use std::sync::Arc;
 

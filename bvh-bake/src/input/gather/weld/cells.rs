@@ -98,6 +98,7 @@ impl Cells {
                 lists.push(list);
             }
             if next.is_none() || waiting >= most.min(USES_PER_BATCH) {
+                spill.go_on()?;
                 let found = threads::map(std::mem::take(&mut lists), |list| self.search(&list, 0, reach));
                 found.into_iter().try_for_each(|found| moves.extend(&found?, spill))?;
                 waiting = 0;

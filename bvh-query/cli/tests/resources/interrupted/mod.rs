@@ -118,12 +118,12 @@ impl Folder {
     }
 }
 
-/// Ends bakes with a signal at moments throughout the bake.
-fn end_with(signal: &str, seed: u64, leaves_nothing: bool) {
+/// Ends bakes with signals, one after the other, at moments throughout the bake.
+fn end_with(signals: &[&str], seed: u64, leaves_nothing: bool) {
     let mut folder = Folder::new();
     let (mut ended, mut stages) = (0, BTreeSet::new());
     let moments = moments(seed);
-    for &moment in &moments {
+    for (&moment, signal) in moments.iter().zip(signals.iter().cycle()) {
         let (in_time, stage) = folder.end(moment, signal);
         let what = format!("{signal} at {moment:.3} of the bake, in stage {stage}");
         if in_time {
@@ -146,13 +146,13 @@ fn end_with(signal: &str, seed: u64, leaves_nothing: bool) {
 
 #[test]
 fn a_bake_that_is_killed_leaves_nothing_for_good() {
-    end_with("-KILL", 1, false);
+    end_with(&["-KILL"], 1, false);
 }
 
 #[cfg(unix)]
 #[test]
 fn a_bake_that_is_told_to_end_leaves_nothing() {
-    end_with("-TERM", 2, true);
+    end_with(&["-TERM", "-INT"], 2, true);
 }
 
 /// A process that is killed at the worst moment may leave a scratch file. The next bake removes it, even if that bake
