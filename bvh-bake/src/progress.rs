@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 ///
 /// [`Progress`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Stage {
     /// Chooses origins, rounds coordinates and finds duplicates.
     Prepare,
@@ -43,6 +44,7 @@ impl Stage {
 ///
 /// [`Progress`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Step {
     /// Reads the inputs, and checks whether the output is up to date.
     Read,
@@ -85,6 +87,7 @@ impl Step {
 ///
 /// [`Progress`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Traffic {
     /// Bytes read from the inputs: each once, and once more if an existing output may be up to date.
     pub input_read: u64,

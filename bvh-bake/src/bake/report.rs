@@ -12,6 +12,7 @@ use bvh_format::topology::ObjectTopology;
 ///
 /// [`FileSummary`] has an example.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct BakeReport {
     /// The summary of the file: layout, counts, bytes and errors.
     pub file: FileSummary,
@@ -51,6 +52,7 @@ pub struct BakeReport {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct FileSummary {
     /// The major and the minor version of the format.
     pub version: (u16, u16),

@@ -29,18 +29,19 @@ pub enum Base {
     Floating,
 }
 
-/// How a robot is read.
+/// How a robot is read. Each field has a method of its name, which sets it.
 ///
 /// ```
 /// use cbvh_robot::{Base, Geometry, Robot, RobotOptions};
 ///
 /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
-/// let options = RobotOptions { base: Base::Planar, geometry: Geometry::Collision, ..RobotOptions::default() };
+/// let options = RobotOptions::new().base(Base::Planar).geometry(Geometry::Collision);
 /// let robot = Robot::from_urdf(path, &options)?;
 /// assert_eq!(robot.joints(), ["base/x", "base/y", "base/theta", "waist", "shoulder", "elbow", "wrist"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RobotOptions {
     /// Folders in which packages are looked for, before those of `ROS_PACKAGE_PATH` and those above the URDF file.
     pub packages: Vec<PathBuf>,
@@ -78,5 +79,60 @@ impl Default for RobotOptions {
             cache: None,
             allow_outside: false,
         }
+    }
+}
+
+impl RobotOptions {
+    /// Returns the defaults.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Sets [`Self::packages`](RobotOptions#structfield.packages).
+    #[must_use]
+    pub fn packages(self, packages: impl IntoIterator<Item: Into<PathBuf>>) -> Self {
+        Self { packages: packages.into_iter().map(Into::into).collect(), ..self }
+    }
+
+    /// Sets [`Self::srdf`](RobotOptions#structfield.srdf).
+    #[must_use]
+    pub fn srdf(self, srdf: impl Into<Option<PathBuf>>) -> Self {
+        Self { srdf: srdf.into(), ..self }
+    }
+
+    /// Sets [`Self::geometry`](RobotOptions#structfield.geometry).
+    #[must_use]
+    pub fn geometry(self, geometry: Geometry) -> Self {
+        Self { geometry, ..self }
+    }
+
+    /// Sets [`Self::base`](RobotOptions#structfield.base).
+    #[must_use]
+    pub fn base(self, base: Base) -> Self {
+        Self { base, ..self }
+    }
+
+    /// Sets [`Self::up_axis`](RobotOptions#structfield.up_axis).
+    #[must_use]
+    pub fn up_axis(self, up_axis: UpAxis) -> Self {
+        Self { up_axis, ..self }
+    }
+
+    /// Sets [`Self::cylinder_error`](RobotOptions#structfield.cylinder_error).
+    #[must_use]
+    pub fn cylinder_error(self, cylinder_error: f64) -> Self {
+        Self { cylinder_error, ..self }
+    }
+
+    /// Sets [`Self::cache`](RobotOptions#structfield.cache).
+    #[must_use]
+    pub fn cache(self, cache: impl Into<Option<PathBuf>>) -> Self {
+        Self { cache: cache.into(), ..self }
+    }
+
+    /// Sets [`Self::allow_outside`](RobotOptions#structfield.allow_outside).
+    #[must_use]
+    pub fn allow_outside(self, allow_outside: bool) -> Self {
+        Self { allow_outside, ..self }
     }
 }

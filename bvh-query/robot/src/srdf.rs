@@ -44,7 +44,7 @@ pub struct Group {
 ///     <group_state name="bent" group="arm"><joint name="elbow" value="0.5"/></group_state>
 /// </robot>"#;
 /// std::fs::write(&srdf, text)?;
-/// let robot = Robot::from_urdf(path, &RobotOptions { srdf: Some(srdf.clone()), ..RobotOptions::default() })?;
+/// let robot = Robot::from_urdf(path, &RobotOptions::default().srdf(srdf.clone()))?;
 /// # std::fs::remove_file(&srdf)?;
 /// assert_eq!((robot.groups()[0].name.as_str(), &robot.groups()[0].joints[..]), ("arm", &[1, 2][..]));
 /// assert_eq!((robot.states()[0].name.as_str(), &robot.states()[0].values[..]), ("bent", &[(2, 0.5)][..]));

@@ -55,7 +55,7 @@ pub(crate) fn robot(text: &str, base: Base) -> Robot {
     let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
-    Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
+    Robot::from_urdf(path, &RobotOptions::default().base(base)).unwrap()
 }
 
 /// Returns joint values within some range, with quaternions of length 1.

@@ -41,6 +41,7 @@ use welded::WeldedInput;
 ///
 /// [`verify`] has an example.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct VerifyReport {
     /// The number of stored triangles, each of which equals one of the mesh.
     pub triangles: u64,

@@ -226,6 +226,8 @@ fn key(step: Step) -> &'static str {
         Step::Bake(Stage::Encode) => "assemble",
         Step::Bake(Stage::Prove) => "prove",
         Step::Write => "write",
+        // A step that a later library adds.
+        _ => step.name(),
     }
 }
 

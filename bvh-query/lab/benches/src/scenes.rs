@@ -27,7 +27,7 @@ pub struct Scene {
 /// Reads a robot with the pairs that its SRDF disables, whose meshes are found in a folder of packages.
 pub fn arm([urdf, srdf, packages]: [&str; 3]) -> Robot {
     let options =
-        RobotOptions { srdf: Some(srdf.into()), packages: vec![packages.into()], ..RobotOptions::default() };
+        RobotOptions::default().srdf(srdf.into()).packages(vec![packages.into()]);
     Robot::from_urdf(urdf, &options).expect("a robot")
 }
 

@@ -46,7 +46,7 @@ fn meshes_with_the_same_text_and_other_buffers_are_not_the_same() {
     write_triangle(&folder.join("small"), 1.0);
     write_triangle(&folder.join("large"), 3.0);
     let cache = folder.join("cache");
-    let cached = RobotOptions { cache: Some(cache.clone()), ..RobotOptions::default() };
+    let cached = RobotOptions::default().cache(cache.clone());
     for far in ["large", "small"] {
         write_robot(folder, far);
         // Once to fill the cache, and once out of it.
@@ -73,7 +73,7 @@ fn buffers_of_meshes_are_read_elsewhere_if_that_is_allowed() {
     fs::write(folder.join("mesh/m.gltf"), GLTF.replace("m.bin", "../m.bin")).unwrap();
     write_urdf(&folder.join("robot.urdf"), "mesh/m.gltf");
     let read = |allow_outside: bool| {
-        let options = RobotOptions { allow_outside, ..RobotOptions::default() };
+        let options = RobotOptions::default().allow_outside(allow_outside);
         Robot::from_urdf(folder.join("robot.urdf"), &options).map(drop)
     };
     assert!(matches!(read(false), Err(RobotError::Mesh { .. })));
@@ -136,14 +136,14 @@ fn meshes_are_read_where_robots_have_them() {
         assert!(matches!(error, RobotError::Outside { .. }), "{uri}: {error}");
         let told = error.to_string();
         assert!(told.contains(&uri) && told.contains("or set allow_outside"), "{told}");
-        read(urdf, &RobotOptions { allow_outside: true, ..plain.clone() }).unwrap();
+        read(urdf, &plain.clone().allow_outside(true)).unwrap();
     }
     // A folder that the reader names.
     write_urdf(&folder.join("ws/arm/urdf/r.urdf"), "package://elsewhere/m.obj");
-    read("ws/arm/urdf/r.urdf", &RobotOptions { packages: vec![folder.to_owned()], ..plain.clone() }).unwrap();
+    read("ws/arm/urdf/r.urdf", &plain.clone().packages(vec![folder.to_owned()])).unwrap();
     write_urdf(&folder.join("ws/arm/urdf/r.urdf"), "../../../elsewhere/m.obj");
     let packages = vec![folder.join("ws/../elsewhere")];
-    read("ws/arm/urdf/r.urdf", &RobotOptions { packages, ..plain.clone() }).unwrap();
+    read("ws/arm/urdf/r.urdf", &plain.clone().packages(packages)).unwrap();
 }
 
 #[cfg(unix)]
@@ -159,7 +159,7 @@ fn links_lead_out_of_a_package_only_where_the_reader_named_the_folder() {
     symlink(folder.join("secret/m.obj"), folder.join("ws/arm/meshes/m.obj")).unwrap();
     let read = |urdf: &str, options: &RobotOptions| Robot::from_urdf(folder.join(urdf), options).map(drop);
     assert!(matches!(read("ws/arm/urdf/r.urdf", &plain), Err(RobotError::Outside { .. })));
-    read("ws/arm/urdf/r.urdf", &RobotOptions { packages: vec![folder.join("ws")], ..plain.clone() }).unwrap();
+    read("ws/arm/urdf/r.urdf", &plain.clone().packages(vec![folder.join("ws")])).unwrap();
     // An installed workspace of links to the files of its packages.
     for package in ["src/arm", "src/hand"] {
         write_mesh(&folder.join(package).join("meshes/m.obj"));
@@ -192,7 +192,7 @@ pub(crate) fn of_texts(urdf: impl AsRef<[u8]>, srdf: Option<&[u8]>) -> Result<Ro
         fs::write(&path, text).unwrap();
         path
     });
-    Robot::from_urdf(path, &RobotOptions { srdf, ..RobotOptions::default() })
+    Robot::from_urdf(path, &RobotOptions::default().srdf(srdf))
 }
 
 /// A row of balls, each on a link of its own, and links without shapes.

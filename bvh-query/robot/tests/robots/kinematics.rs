@@ -29,7 +29,7 @@ pub(crate) fn read(text: &str, base: Base) -> Robot {
     let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, text).unwrap();
-    Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
+    Robot::from_urdf(path, &RobotOptions::default().base(base)).unwrap()
 }
 
 fn check(robot: &Robot, joints: &[f64], link: &str, expected: &Matrix) {
@@ -116,8 +116,7 @@ fn the_semantics_name_groups_states_and_pairs_to_pass_over() {
     </robot>"#;
     std::fs::write(&srdf, text).unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/robot/robot.urdf");
-    let mut robot =
-        Robot::from_urdf(&path, &RobotOptions { srdf: Some(srdf), ..RobotOptions::default() }).unwrap();
+    let mut robot = Robot::from_urdf(&path, &RobotOptions::default().srdf(srdf)).unwrap();
     let groups: Vec<_> = robot.groups().iter().map(|group| (&*group.name, group.joints.clone())).collect();
     assert_eq!(groups, [("arm", vec![0, 1, 2]), ("hand", vec![3]), ("all", vec![0, 1, 2, 3])]);
     assert_eq!(robot.states()[0].values, [(2, 0.5)]);

@@ -32,9 +32,9 @@ const HERE: &str = "<node><instance_geometry url=\"#g\"/></node>";
 
 #[test]
 fn the_axis_counts_only_if_it_is_applied() {
-    let turned = || RobotOptions { up_axis: UpAxis::Turned, ..RobotOptions::default() };
+    let turned = || RobotOptions::default().up_axis(UpAxis::Turned);
     let folder = cbvh_testkit::folder();
-    let cached = |options| RobotOptions { cache: Some(folder.path().to_owned()), ..options };
+    let cached = |options: RobotOptions| options.cache(folder.path().to_owned());
     for _ in 0..2 {
         for (options, point, touches) in [
             (RobotOptions::default(), [1.1, 0.1, 2.0], true),

@@ -186,8 +186,7 @@ fn a_quaternion_without_length_is_refused() {
     let folder = cbvh_testkit::folder();
     let path = folder.path().join("robot.urdf");
     std::fs::write(&path, with(JOINT, BALL)).unwrap();
-    let mut robot =
-        Robot::from_urdf(path, &RobotOptions { base: Base::Floating, ..RobotOptions::default() }).unwrap();
+    let mut robot = Robot::from_urdf(path, &RobotOptions::default().base(Base::Floating)).unwrap();
     assert!(matches!(robot.collide(&[0.0; 8]), Err(RobotError::Value { .. })));
     let mut q = [0.0; 8];
     q[6] = 1.0;

@@ -29,13 +29,8 @@ fn described(folder: &Path) -> Robot {
       <disable_collisions link1="upper_arm" link2="forearm"/><disable_collisions link1="forearm" link2="hand"/>
       <disable_collisions link1="base" link2="hand"/></robot>"#;
     std::fs::write(&srdf, semantics).unwrap();
-    let options = RobotOptions {
-        srdf: Some(srdf),
-        geometry: Geometry::Visual,
-        base: Base::Planar,
-        cylinder_error: 1e-2,
-        ..RobotOptions::default()
-    };
+    let options =
+        RobotOptions::default().srdf(srdf).geometry(Geometry::Visual).base(Base::Planar).cylinder_error(1e-2);
     Robot::from_urdf(urdf, &options).unwrap()
 }
 

@@ -17,7 +17,7 @@ pub(crate) fn arm(base: Base) -> Robot {
 
 fn arm_with_all_pairs(base: Base) -> Robot {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/robot/robot.urdf");
-    Robot::from_urdf(path, &RobotOptions { base, ..RobotOptions::default() }).unwrap()
+    Robot::from_urdf(path, &RobotOptions::default().base(base)).unwrap()
 }
 
 pub(crate) fn block(sides: [f64; 3]) -> OwnedShape {

@@ -16,8 +16,7 @@ fn height(urdf: &Path, uri: &str, packages: &[&Path]) -> Result<f64, RobotError>
     fs::create_dir_all(urdf.parent().unwrap()).unwrap();
     let mesh = format!("<collision><geometry><mesh filename=\"{uri}\"/></geometry></collision>");
     fs::write(urdf, format!("<robot><link name=\"a\">{mesh}</link></robot>")).unwrap();
-    let packages = packages.iter().map(|&folder| folder.to_owned()).collect();
-    let robot = Robot::from_urdf(urdf, &RobotOptions { packages, ..RobotOptions::default() })?;
+    let robot = Robot::from_urdf(urdf, &RobotOptions::default().packages(packages.iter().copied()))?;
     let shapes = robot.shapes(0)?;
     let [(shape, _)] = &shapes[..] else { unreachable!("one link with one mesh") };
     let closest = Querier::new().unwrap().closest_point(shape, [0.2, 0.2, 0.0], f64::INFINITY).unwrap();

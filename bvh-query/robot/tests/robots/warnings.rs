@@ -149,7 +149,7 @@ fn a_robot_without_shapes_is_told() {
     let path = folder.path().join("r.urdf");
     let read = |text: &str, geometry| {
         fs::write(&path, text).unwrap();
-        Robot::from_urdf(&path, &RobotOptions { geometry, ..RobotOptions::default() }).unwrap()
+        Robot::from_urdf(&path, &RobotOptions::default().geometry(geometry)).unwrap()
     };
     let (no_collision, no_visual) =
         ("no link has a <collision>, so that the robot touches nothing", "no link has a <visual>, so that");
@@ -205,11 +205,7 @@ fn the_warnings_of_meshes_are_those_of_the_robot() {
     );
     fs::write(folder.join("r.urdf"), text).unwrap();
     fs::write(folder.join("r.srdf"), "<robot><disable_collisions link1=\"a\" link2=\"c\"/></robot>").unwrap();
-    let options = RobotOptions {
-        srdf: Some(folder.join("r.srdf")),
-        cache: Some(folder.join("cache")),
-        ..RobotOptions::default()
-    };
+    let options = RobotOptions::default().srdf(folder.join("r.srdf")).cache(folder.join("cache"));
     let expected = [
         ("r.urdf: line 1, <limit>: joint 'j' has the lower limit 1", "without limits"),
         ("r.urdf: link a: ", "long.stl: byte 134: left out 3 more bytes after the last triangle"),

@@ -142,8 +142,7 @@ fn a_base_far_away_does_not_matter_to_what_it_carries() {
       <joint name="two" type="prismatic"><parent link="base"/><child link="right"/><axis xyz="1 0 0"/>
         <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
     std::fs::write(&path, text).unwrap();
-    let mut robot =
-        Robot::from_urdf(&path, &RobotOptions { base: Base::Planar, ..RobotOptions::default() }).unwrap();
+    let mut robot = Robot::from_urdf(&path, &RobotOptions::default().base(Base::Planar)).unwrap();
     let random = &mut Random::new(65);
     let options = MotionOptions::default();
     let (mut free, mut hit) = (0, 0);

@@ -334,7 +334,7 @@ fn macros_are_passed_over_where_they_do_not_matter() {
         .replace("collision>", "visual>")
         .replace("</link>", "<collision><xacro:a/></collision></link>");
     fs::write(&path, text).unwrap();
-    let read = |geometry| Robot::from_urdf(&path, &RobotOptions { geometry, ..RobotOptions::default() });
+    let read = |geometry| Robot::from_urdf(&path, &RobotOptions::default().geometry(geometry));
     check(read(Geometry::Visual), "Größe", "visual");
     assert!(read(Geometry::Collision).unwrap_err().to_string().contains("found <xacro:a>"));
 }

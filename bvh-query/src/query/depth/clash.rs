@@ -25,6 +25,7 @@ use crate::query::rounded::{limit_of_cores, sum_of_radii};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum ClashClass {
     /// Their surfaces are farther apart than the clearance and the tolerance, and neither is inside the other.
     Apart = 0,
