@@ -79,8 +79,8 @@ mod tests {
         newer[..10].copy_from_slice(b"\x89cbvh\r\n\x1a\x05\0");
         assert_eq!(
             text(&newer),
-            "byte 8: R02 (the version is one that this reader knows): expected 1.0-rc3, found 5.0; \
-             bake it again with this cbvh"
+            "byte 8: R02 (the major version is one that this reader knows): expected version 1.x, found 5.0; \
+             bake it again, or use a newer cbvh"
         );
     }
 }

@@ -11,10 +11,10 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 /// The first eight bytes of a file. A transfer in text mode changes the high bit or the line ends, and is so detected.
 pub const MAGIC: [u8; 8] = [0x89, b'c', b'b', b'v', b'h', 0x0d, 0x0a, 0x1a];
-/// The major version. 0 stands for the release candidates of version 1.0.
-pub const MAJOR: u16 = 0;
-/// The minor version: the number of the release candidate. Readers refuse any other version.
-pub const MINOR: u16 = 3;
+/// The major version. Readers refuse any other, and 0 stands for the release candidates of version 1.0.
+pub const MAJOR: u16 = 1;
+/// The minor version that writers state. Readers take any: a later one only adds sections.
+pub const MINOR: u16 = 0;
 /// The most entries that the section table can have.
 pub const MAX_SECTIONS: usize = 64;
 /// The most bytes that the header and the section table can take together.
@@ -25,7 +25,8 @@ pub const fn head_bytes(sections: usize) -> usize {
     size_of::<Header>() + sections * size_of::<SectionEntry>()
 }
 
-/// Returns the name of a version that a header states as a major and a minor number: `1.0-rc3` for 0 and 3.
+/// Returns the name of a version that a header states as a major and a minor number: `1.0` for 1 and 0, and `1.0-rc3`
+/// for 0 and 3, a release candidate.
 pub fn version_name((major, minor): (u16, u16)) -> String {
     if major == 0 { format!("1.0-rc{minor}") } else { format!("{major}.{minor}") }
 }
@@ -228,8 +229,9 @@ pub(crate) fn read_header(bytes: &[u8], length: u64) -> Result<(Header, Vec<Sect
     let (header, rest) = Header::read_from_prefix(bytes).map_err(|_| {
         FormatError::new(Rule::HeaderSize, 0, format!("{} bytes or more", size_of::<Header>()), bytes.len())
     })?;
-    let version = version_name((header.major.get(), header.minor.get()));
-    require(Rule::Version, 8, version_name((MAJOR, MINOR)), version)?;
+    ensure(header.major.get() == MAJOR, Rule::Version, 8, || {
+        (format!("version {MAJOR}.x"), version_name((header.major.get(), header.minor.get())))
+    })?;
     let count = header.sections.get() as usize;
     ensure(count <= MAX_SECTIONS, Rule::SectionCount, 12, || ("at most 64".into(), count.to_string()))?;
     let (entries, _) = <[SectionEntry]>::ref_from_prefix_with_elems(rest, count)

@@ -33,7 +33,7 @@ macro_rules! rules {
 
 rules! {
     Magic = 1, "the file starts with the magic bytes";
-    Version = 2, "the version is one that this reader knows";
+    Version = 2, "the major version is one that this reader knows";
     HeaderSize = 3, "the file holds a whole header";
     HeaderChecksum = 4, "the checksum in the header is that of the header and the section table";
     FileLength = 5, "the file is as long as the header states";
@@ -97,7 +97,7 @@ impl Rule {
         match self {
             Self::Magic => "this is not a .cbvh file: bake it first",
             // A later version may have written what this reader does not know.
-            Self::Version | Self::SectionKnown | Self::ObjectProfile => "bake it again with this cbvh",
+            Self::Version | Self::SectionKnown | Self::ObjectProfile => "bake it again, or use a newer cbvh",
             _ => "the file is damaged: copy it again, or bake it again",
         }
     }

@@ -55,8 +55,7 @@ def open_file(data):
     file = cbvh.File(data)
     file.read_header()
     header = file.header
-    stated = (header.major, header.minor)
-    need(stated == (cbvh.MAJOR, cbvh.MINOR), 2, header.place("major"), (cbvh.MAJOR, cbvh.MINOR), stated)
+    need(header.major == cbvh.MAJOR, 2, header.place("major"), f"version {cbvh.MAJOR}.x", f"{header.major}.{header.minor}")
     most, whole = cbvh.MAX_SECTIONS, file.head_bytes()
     need(header.sections <= most, 6, header.place("sections"), f"at most {most}", header.sections)
     need(len(data) >= whole, 6, len(data), f"at least {whole} bytes", len(data))

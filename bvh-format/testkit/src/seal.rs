@@ -55,7 +55,7 @@ fn head(sections: usize) -> usize {
 /// Returns a file of these sections with correct checksums.
 pub fn put_together(sections: &[Section]) -> Vec<u8> {
     let mut bytes = vec![0; head(sections.len())];
-    put(&mut bytes, 0, &[0x89, b'c', b'b', b'v', b'h', 13, 10, 26, 0, 0, 3, 0]);
+    put(&mut bytes, 0, &[0x89, b'c', b'b', b'v', b'h', 13, 10, 26, 1, 0, 0, 0]);
     put(&mut bytes, 12, &(sections.len() as u32).to_le_bytes());
     for (index, (kind, required, data)) in sections.iter().enumerate() {
         let at = head(index);

@@ -6,13 +6,14 @@
 //! keep the files small, they omit the sections that the rule does not need.
 
 use bvh_format::checksum::checksum;
+use bvh_format::header::version_name;
 use bvh_format::instances::{Instance, write_instances};
 use bvh_format::validate::validate;
 use bvh_format::{FormatError, Layout, Rule};
 use cbvh_testkit::seal::{
     put, put_together, seal, seal_header, seal_pages, seal_sections, section, take_apart,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 fn testdata() -> PathBuf {
@@ -26,6 +27,25 @@ fn frozen(start: &str) -> Vec<(String, Vec<u8>)> {
     names.sort();
     let read = |name: String| (std::fs::read(testdata().join(&name)).unwrap(), name);
     names.into_iter().map(read).map(|(bytes, name)| (name, bytes)).collect()
+}
+
+/// Checks that a file of `testdata/` has these bytes. With `CBVH_BLESS=1`, a missing one is written.
+fn check(name: &str, bytes: &[u8]) {
+    let path = testdata().join(name);
+    if !path.exists() && std::env::var_os("CBVH_BLESS").is_some() {
+        std::fs::write(&path, bytes).unwrap();
+    }
+    assert!(std::fs::read(&path).unwrap() == *bytes, "{name} is not what was frozen");
+}
+
+/// A file of a later minor version: that of `ok-plain.cbvh`, with a section that no reader of version 1.0 knows.
+fn later() -> Vec<u8> {
+    let mut sections = take_apart(&std::fs::read(testdata().join("ok-plain.cbvh")).unwrap());
+    sections.push((99, 0, b"a section of version 1.7".to_vec()));
+    let mut bytes = put_together(&sections);
+    put(&mut bytes, 10, &[7]);
+    seal(&mut bytes);
+    bytes
 }
 
 /// The cube of `ok-everything.cbvh` three times in the world: as it is, moved and turned, and without a name.
@@ -140,7 +160,7 @@ fn bad_at_open() -> Vec<(u32, &'static str, Vec<u8>)> {
         (1, "text", b"solid not a bounding volume hierarchy\n".to_vec()),
         (1, "line-ends", header(|f| f.header(5, b"\n\n"))),
         (2, "major-5", header(|f| f.header(8, &[5]))),
-        (2, "another-candidate", header(|f| f.header(10, &[1]))),
+        (2, "candidate", header(|f| f.header(8, &[0, 0, 3]))),
         (3, "short", change(&[], |f| f.bytes.truncate(60))),
         (4, "flipped-bit", change(&[], |f| f.bytes[60] ^= 1)),
         (5, "truncated", change(&[1], |f| f.bytes.truncate(100))),
@@ -489,16 +509,65 @@ fn number_of(error: Result<Layout, FormatError>) -> u32 {
 
 #[test]
 fn good_files_are_valid() {
-    let path = testdata().join("ok-scene.cbvh");
-    if !path.exists() && std::env::var_os("CBVH_BLESS").is_some() {
-        std::fs::write(&path, scene()).unwrap();
-    }
-    assert!(std::fs::read(&path).unwrap() == scene(), "ok-scene.cbvh is not what was frozen");
+    check("ok-scene.cbvh", &scene());
+    check("ok-later.cbvh", &later());
     let files = frozen("ok-");
-    assert!(files.len() >= 3);
+    assert!(files.len() >= 10);
     for (name, bytes) in files {
         validate(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
     }
+}
+
+/// The list of `frozen.txt` names each file of the folder and its checksum. With `CBVH_BLESS=1`, files that it lacks are added.
+#[test]
+fn frozen_files_never_change() {
+    let path = testdata().join("frozen.txt");
+    let files: BTreeMap<String, String> =
+        frozen("").into_iter().map(|(name, bytes)| (name, format!("{:016x}", checksum(&bytes)))).collect();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    if std::env::var_os("CBVH_BLESS").is_some() {
+        let new =
+            files.iter().filter(|(name, _)| !lines.iter().any(|line| line.ends_with(&format!(" {name}"))));
+        let new: Vec<String> = new.map(|(name, sum)| format!("{sum} {name}")).collect();
+        lines.extend(new);
+        std::fs::write(&path, lines.join("\n") + "\n").unwrap();
+    }
+    let stated: BTreeMap<String, String> = lines
+        .iter()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split_once(' ').map(|(sum, name)| (name.to_owned(), sum.to_owned())).unwrap())
+        .collect();
+    assert_eq!(stated, files);
+    assert_eq!(stated.len() + 1, lines.len(), "a file is named twice");
+}
+
+/// Sections that this reader does not know are skipped, whatever the minor version, and the content is the same.
+#[test]
+fn a_later_minor_version_is_read() {
+    let [plain, later] =
+        ["ok-plain.cbvh", "ok-later.cbvh"].map(|name| std::fs::read(testdata().join(name)).unwrap());
+    let [plain, found] = [&plain, &later].map(|bytes| validate(bytes).unwrap());
+    assert_eq!((found.version, version_name(found.version)), ((1, 7), "1.7".to_owned()));
+    assert_eq!(found.content_checksum, plain.content_checksum);
+    assert_eq!(found.objects.len(), plain.objects.len());
+    for minor in [0, 1, u16::MAX] {
+        let mut bytes = later.clone();
+        put(&mut bytes, 10, &minor.to_le_bytes());
+        assert_eq!(number_of(validate(&bytes)), 4, "the checksum covers the version");
+        seal(&mut bytes);
+        assert_eq!(validate(&bytes).unwrap().version, (1, minor));
+    }
+    // The same section, if it is required, and the next major version.
+    let mut sections = take_apart(&later);
+    sections.last_mut().unwrap().1 = 1;
+    assert_eq!(number_of(validate(&put_together(&sections))), 8);
+    let mut next = later;
+    put(&mut next, 8, &2u16.to_le_bytes());
+    seal(&mut next);
+    let error = validate(&next).unwrap_err();
+    assert_eq!(error.rule.number(), 2);
+    assert!(error.to_string().contains("expected version 1.x, found 2.7"), "{error}");
 }
 
 #[test]
@@ -512,12 +581,7 @@ fn bad_files_break_the_rule_in_their_name() {
     // Only one file per rule is frozen, to keep the folder small.
     let mut frozen_rules = BTreeSet::new();
     for (rule, what, bytes) in bad.iter().filter(|(rule, _, _)| *rule > 0 && frozen_rules.insert(*rule)) {
-        let name = format!("bad-R{rule:02}-{what}.cbvh");
-        let path = testdata().join(&name);
-        if !path.exists() && std::env::var_os("CBVH_BLESS").is_some() {
-            std::fs::write(&path, bytes).unwrap();
-        }
-        assert!(std::fs::read(&path).unwrap() == *bytes, "{name} is not what was frozen");
+        check(&format!("bad-R{rule:02}-{what}.cbvh"), bytes);
     }
     let files = frozen("bad-");
     for (name, bytes) in &files {

@@ -52,7 +52,7 @@ fn the_report_has_the_fields_of_the_contract() {
     let size = fs::metadata(directory.join("c.cbvh")).unwrap().len();
     assert_eq!(baked["input"], "cube.obj");
     assert_eq!(baked["output"], "c.cbvh");
-    assert_eq!(baked["format_version"], "1.0-rc3");
+    assert_eq!(baked["format_version"], "1.0");
     assert_eq!((&baked["triangles_in"], &baked["triangles"]), (&14.into(), &12.into()));
     assert_eq!((&baked["duplicates"], &baked["degenerate"]), (&2.into(), &0.into()));
     assert_eq!(baked["objects"], 1);
