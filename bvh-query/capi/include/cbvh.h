@@ -65,14 +65,14 @@ extern "C" {
 #endif
 
 /* The version of the library that this header belongs to. */
-#define CBVH_VERSION_MAJOR 0
-#define CBVH_VERSION_MINOR 9
+#define CBVH_VERSION_MAJOR 1
+#define CBVH_VERSION_MINOR 0
 #define CBVH_VERSION_PATCH 0
 
 /* The version of the binary interface, which is the number in the name of the shared library. A library runs programs
  * that were built with an older header of the same number. Within a number, functions and constants may be added, and
  * existing ones keep their meaning. */
-#define CBVH_ABI 0
+#define CBVH_ABI 1
 
 /* ---------------------------------------------------------------------------------------------------------- status */
 

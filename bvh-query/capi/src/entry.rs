@@ -98,7 +98,7 @@ pub extern "C" fn cbvh_last_message() -> *const c_char {
 }
 
 /// The number of the binary interface, which is part of the name of the shared library: `build.rs` has it, too.
-pub const ABI: u32 = 0;
+pub const ABI: u32 = 1;
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cbvh_abi(abi: *mut u32) -> i32 {

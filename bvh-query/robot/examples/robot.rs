@@ -17,8 +17,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let arm = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");
     let path = arguments.next().unwrap_or_else(|| arm.to_owned());
-    let srdf = arguments.next().map(Into::into);
-    let mut robot = Robot::from_urdf(path, &RobotOptions::default().srdf(srdf))?;
+    let mut options = RobotOptions::new();
+    options.srdf = arguments.next().map(Into::into);
+    let mut robot = Robot::from_urdf(path, &options)?;
     for (pair, share) in robot.allow_frequent(1000, 0.1)? {
         println!(
             "{} and {} may touch: they do in {:.1} % of all configurations",

@@ -96,8 +96,8 @@ impl RobotOptions {
 
     /// Sets [`Self::srdf`](RobotOptions#structfield.srdf).
     #[must_use]
-    pub fn srdf(self, srdf: impl Into<Option<PathBuf>>) -> Self {
-        Self { srdf: srdf.into(), ..self }
+    pub fn srdf(self, srdf: impl Into<PathBuf>) -> Self {
+        Self { srdf: Some(srdf.into()), ..self }
     }
 
     /// Sets [`Self::geometry`](RobotOptions#structfield.geometry).
@@ -126,8 +126,8 @@ impl RobotOptions {
 
     /// Sets [`Self::cache`](RobotOptions#structfield.cache).
     #[must_use]
-    pub fn cache(self, cache: impl Into<Option<PathBuf>>) -> Self {
-        Self { cache: cache.into(), ..self }
+    pub fn cache(self, cache: impl Into<PathBuf>) -> Self {
+        Self { cache: Some(cache.into()), ..self }
     }
 
     /// Sets [`Self::allow_outside`](RobotOptions#structfield.allow_outside).

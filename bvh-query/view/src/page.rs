@@ -48,6 +48,7 @@ pub struct Page {
 ///
 /// [`Page::scene`] has an example.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Placed {
     /// The name of the instance.
     pub name: String,
@@ -67,6 +68,7 @@ pub struct Placed {
 ///
 /// [`Page::clashes`] has an example.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct PlacedClash {
     /// The numbers of the instances.
     pub pair: [usize; 2],
@@ -84,6 +86,21 @@ pub struct PlacedClash {
     pub volume: Option<f64>,
     /// How thick each of both is where the other one passes through it, if that was measured and it does.
     pub pierced: [Option<f64>; 2],
+}
+
+impl Placed {
+    /// A shape that stands there, without a margin and in all groups.
+    pub fn new(name: impl Into<String>, of: Named, pose: Pose) -> Self {
+        Self { name: name.into(), of, pose, margin: 0.0, groups: Groups::ALL, moving: false }
+    }
+}
+
+impl PlacedClash {
+    /// A clash of which the class and a place are known.
+    pub fn new(pair: [usize; 2], class: ClashClass, point: [f64; 3]) -> Self {
+        let (depth, distance, translation, volume) = (None, None, None, None);
+        Self { pair, class, depth, distance, point, translation, volume, pierced: [None; 2] }
+    }
 }
 
 impl Page {
@@ -150,21 +167,15 @@ impl Page {
     /// moving instances, in the order of the instances.
     ///
     /// ```
-    /// use bvh_query::{Groups, Pose};
+    /// use bvh_query::Pose;
     /// use cbvh_view::{Named, Page, Placed};
     ///
     /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
     /// let of = Named { name: "block".into(), path: "block.cbvh".into(), shape: block.into() };
     /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
-    /// let still = Placed {
-    ///     name: "left".into(),
-    ///     of,
-    ///     pose: at(0.0)?,
-    ///     margin: 0.0,
-    ///     groups: Groups::ALL,
-    ///     moving: false,
-    /// };
-    /// let moving = Placed { name: "right".into(), pose: at(3.0)?, moving: true, ..still.clone() };
+    /// let still = Placed::new("left", of.clone(), at(0.0)?);
+    /// let mut moving = Placed::new("right", of, at(3.0)?);
+    /// moving.moving = true;
     /// let frames = vec![vec![at(3.0)?], vec![at(2.0)?]]; // of the one that moves
     /// let page = Page::scene([still, moving], vec![[0, 1]], vec![], frames)?; // the two may touch
     /// # page.write(&mut std::io::sink())?;
@@ -199,26 +210,19 @@ impl Page {
     /// Shows instances and which of them clash, in this order.
     ///
     /// ```
-    /// use bvh_query::{Clash, ClashOptions, Groups, Pose, Querier};
+    /// use bvh_query::{Clash, ClashOptions, Pose, Querier};
     /// use cbvh_view::{Named, Page, Placed, PlacedClash};
     ///
     /// # let block = bvh_query::Bvh::from_bytes(bvh_bake::to_bytes(&bvh_bake::shapes::block([2.0; 3])?, &Default::default())?.0)?;
     /// let at = |x| Pose::new(*Pose::IDENTITY.rotation(), [x, 0.0, 0.0]);
     /// let found: Clash = Querier::new()?.clash(&block, &block, &at(1.5)?, &ClashOptions::new())?;
-    /// let clash = PlacedClash {
-    ///     pair: [0, 1],
-    ///     class: found.class,
-    ///     depth: found.depth.map(|depth| [depth.lower, depth.upper]),
-    ///     distance: None,
-    ///     point: found.point, // the frame of the first instance is that of the world here
-    ///     translation: found.depth.map(|depth| depth.translation),
-    ///     volume: None,
-    ///     pierced: [None; 2],
-    /// };
+    /// // The frame of the first instance is that of the world here.
+    /// let mut clash = PlacedClash::new([0, 1], found.class, found.point);
+    /// clash.depth = found.depth.map(|depth| [depth.lower, depth.upper]);
+    /// clash.translation = found.depth.map(|depth| depth.translation);
     /// # let of = Named { name: "block".into(), path: "block.cbvh".into(), shape: block.into() };
-    /// # let groups = Groups::ALL;
-    /// # let left = Placed { name: "left".into(), of, pose: at(0.0)?, margin: 0.0, groups, moving: false };
-    /// # let right = Placed { name: "right".into(), pose: at(1.5)?, ..left.clone() };
+    /// let left = Placed::new("left", of.clone(), at(0.0)?);
+    /// let right = Placed::new("right", of, at(1.5)?);
     /// let page = Page::clashes([left, right], &[clash])?;
     /// # page.write(&mut std::io::sink())?;
     /// # Ok::<(), Box<dyn std::error::Error>>(())

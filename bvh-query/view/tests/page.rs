@@ -33,7 +33,7 @@ fn shifted(x: f64) -> Pose {
 }
 
 fn placed(name: &str, of: Named, x: f64) -> Placed {
-    Placed { name: name.to_owned(), of, pose: shifted(x), margin: 0.0, groups: Groups::ALL, moving: false }
+    Placed::new(name, of, shifted(x))
 }
 
 /// Returns two objects in one file.
@@ -268,33 +268,15 @@ fn a_scene_of_the_library_is_shown_as_it_is() {
 fn clashes_have_what_is_known() {
     let block = block();
     let instances = || ["a", "b", "c"].map(|name| placed(name, named("block", block.clone()), 0.0));
-    let deep = PlacedClash {
-        pair: [0, 1],
-        class: ClashClass::Overlapping,
-        depth: Some([0.5, 0.75]),
-        distance: None,
-        point: [1.0, 2.0, 3.0],
-        translation: Some([0.0, 0.75, 0.0]),
-        volume: None,
-        pierced: [None; 2],
-    };
-    let near = PlacedClash {
-        pair: [1, 2],
-        class: ClashClass::Near,
-        depth: None,
-        distance: Some(0.125),
-        translation: None,
-        ..deep
-    };
-    let measured = PlacedClash {
-        class: ClashClass::Piercing,
-        volume: Some(2.5),
-        pierced: [None, Some(0.375)],
-        depth: None,
-        translation: None,
-        ..deep
-    };
-    let protruding = PlacedClash { class: ClashClass::Protruding, pierced: [None; 2], ..measured };
+    let point = [1.0, 2.0, 3.0];
+    let mut deep = PlacedClash::new([0, 1], ClashClass::Overlapping, point);
+    (deep.depth, deep.translation) = (Some([0.5, 0.75]), Some([0.0, 0.75, 0.0]));
+    let mut near = PlacedClash::new([1, 2], ClashClass::Near, point);
+    near.distance = Some(0.125);
+    let mut protruding = PlacedClash::new([0, 1], ClashClass::Protruding, point);
+    protruding.volume = Some(2.5);
+    let mut measured = protruding;
+    (measured.class, measured.pierced) = (ClashClass::Piercing, [None, Some(0.375)]);
     let all = [deep, near, measured, protruding];
     let (content, _) = unpacked(&Page::clashes(instances(), &all).unwrap());
     assert_eq!(
@@ -307,17 +289,19 @@ fn clashes_have_what_is_known() {
             { "a": 0, "b": 1, "class": "protruding", "point": [1.0, 2.0, 3.0], "volume": 2.5 },
         ])
     );
-    let refused = |clash| Page::clashes(instances(), &[clash]).unwrap_err();
-    assert!(matches!(
-        refused(PlacedClash { pair: [0, 3], ..deep }),
-        PageError::Instance { count: 3, found: 3 }
-    ));
+    let refused = |change: &dyn Fn(&mut PlacedClash)| {
+        let mut clash = deep;
+        change(&mut clash);
+        Page::clashes(instances(), &[clash]).unwrap_err()
+    };
+    let missing = refused(&|clash| clash.pair = [0, 3]);
+    assert!(matches!(missing, PageError::Instance { count: 3, found: 3 }), "{missing}");
     for wrong in [
-        PlacedClash { point: [f64::NAN; 3], ..deep },
-        PlacedClash { volume: Some(f64::INFINITY), ..deep },
-        PlacedClash { pierced: [Some(f64::NAN), None], ..deep },
+        refused(&|clash| clash.point = [f64::NAN; 3]),
+        refused(&|clash| clash.volume = Some(f64::INFINITY)),
+        refused(&|clash| clash.pierced = [Some(f64::NAN), None]),
     ] {
-        assert!(matches!(refused(wrong), PageError::Number { .. }));
+        assert!(matches!(wrong, PageError::Number { .. }), "{wrong}");
     }
 }
 
@@ -420,7 +404,8 @@ fn wrong_numbers_and_sizes_are_refused() {
         assert!(matches!(refused, PageError::Number { name: "clearance", .. }), "{refused}");
         let refused = Page::motion(of(), None, [Pose::IDENTITY; 2], 0.0, Some(wrong)).unwrap_err();
         assert!(matches!(refused, PageError::Number { name: "tolerance", .. }), "{refused}");
-        let instance = Placed { margin: wrong, ..placed("a", of(), 0.0) };
+        let mut instance = placed("a", of(), 0.0);
+        instance.margin = wrong;
         let refused = Page::scene([instance], Vec::new(), Vec::new(), Vec::new()).unwrap_err();
         assert!(matches!(refused, PageError::Number { name: "margin", .. }), "{refused}");
     }
@@ -434,7 +419,8 @@ fn wrong_numbers_and_sizes_are_refused() {
     let refused = Page::file(of()).unwrap().limited_to(bytes - 1).unwrap_err();
     assert!(matches!(refused, PageError::TooLarge { .. }), "{refused}");
     // Frames count as well.
-    let moving = Placed { moving: true, ..placed("a", of(), 0.0) };
+    let mut moving = placed("a", of(), 0.0);
+    moving.moving = true;
     let page = Page::scene([moving], Vec::new(), Vec::new(), vec![vec![Pose::IDENTITY]; 10]).unwrap();
     assert_eq!(page.bytes(), bytes + 10 * 96);
 }

@@ -11,14 +11,10 @@ use cbvh_view::{Named, Page, Placed, PlacedClash};
 pub(super) fn page(assembly: &Assembly, found: &[Found<'_>]) -> Result<Page, Failure> {
     let placed = |part: &Part| {
         let shape = part.shape.opened().map_err(|error| of_file(&error))?;
-        Ok(Placed {
-            name: part.name.clone(),
-            of: Named { name: name_of(&part.file), path: part.file.display().to_string(), shape },
-            pose: part.world,
-            margin: part.margin,
-            groups: part.groups,
-            moving: false,
-        })
+        let of = Named { name: name_of(&part.file), path: part.file.display().to_string(), shape };
+        let mut placed = Placed::new(&part.name, of, part.world);
+        (placed.margin, placed.groups) = (part.margin, part.groups);
+        Ok(placed)
     };
     let placed = assembly.parts.iter().map(placed).collect::<Result<Vec<_>, Failure>>()?;
     let clashes: Vec<PlacedClash> = found.iter().map(clash).collect();
@@ -26,14 +22,9 @@ pub(super) fn page(assembly: &Assembly, found: &[Found<'_>]) -> Result<Page, Fai
 }
 
 fn clash(of: &Found<'_>) -> PlacedClash {
-    PlacedClash {
-        pair: of.parts,
-        class: of.class,
-        depth: of.depth,
-        distance: of.distance,
-        point: of.point,
-        translation: of.translation,
-        volume: of.shared.map(|shared| shared.volume),
-        pierced: of.shared.map_or([None; 2], |shared| [shared.pierced_a, shared.pierced_b]),
-    }
+    let mut clash = PlacedClash::new(of.parts, of.class, of.point);
+    (clash.depth, clash.distance, clash.translation) = (of.depth, of.distance, of.translation);
+    clash.volume = of.shared.map(|shared| shared.volume);
+    clash.pierced = of.shared.map_or([None; 2], |shared| [shared.pierced_a, shared.pierced_b]);
+    clash
 }

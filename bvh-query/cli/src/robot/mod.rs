@@ -219,10 +219,9 @@ fn parse_obstacle(text: &str) -> Result<(PathBuf, Pose), Failure> {
 
 /// Reads the robot, and tells what was read otherwise than its author may have meant.
 fn read_robot(arguments: &RobotArguments) -> Result<Robot, Failure> {
-    let options = RobotOptions::default()
-        .packages(arguments.package_dir.clone())
-        .srdf(arguments.srdf.clone())
-        .allow_outside(arguments.allow_outside);
+    let mut options =
+        RobotOptions::new().packages(arguments.package_dir.clone()).allow_outside(arguments.allow_outside);
+    options.srdf.clone_from(&arguments.srdf);
     let robot = Robot::from_urdf(&arguments.urdf, &options);
     let robot = robot.map_err(|error| from_robot(error, &arguments.urdf))?;
     robot.warnings().iter().for_each(|warning| tell_warning(warning));

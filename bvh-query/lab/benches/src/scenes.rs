@@ -26,8 +26,7 @@ pub struct Scene {
 
 /// Reads a robot with the pairs that its SRDF disables, whose meshes are found in a folder of packages.
 pub fn arm([urdf, srdf, packages]: [&str; 3]) -> Robot {
-    let options =
-        RobotOptions::default().srdf(srdf.into()).packages(vec![packages.into()]);
+    let options = RobotOptions::new().srdf(srdf).packages([packages]);
     Robot::from_urdf(urdf, &options).expect("a robot")
 }
 

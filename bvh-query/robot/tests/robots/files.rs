@@ -192,7 +192,9 @@ pub(crate) fn of_texts(urdf: impl AsRef<[u8]>, srdf: Option<&[u8]>) -> Result<Ro
         fs::write(&path, text).unwrap();
         path
     });
-    Robot::from_urdf(path, &RobotOptions::default().srdf(srdf))
+    let mut options = RobotOptions::default();
+    options.srdf = srdf;
+    Robot::from_urdf(path, &options)
 }
 
 /// A row of balls, each on a link of its own, and links without shapes.
