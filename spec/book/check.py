@@ -7,7 +7,7 @@
                                     compares it
     check.py tasks                  runs the Python programs of the page of tasks with this Python, and compares the output that they state
     check.py site FOLDER            every link of the pages that mdBook wrote there leads to a file
-    check.py words                  prints the number of words of each page
+    check.py words                  prints the number of words of each page, and of all that users read
 
 A shell block runs unless `ignore` follows its language. The blocks of a page run in one new folder, in order, where `testdata` is that of
 the repository. If the next block is `text`, it must be the output; `…` in it stands for any characters of a line, and for any lines where
@@ -233,9 +233,28 @@ def check_site(folder: str) -> list[str]:
     return wrong
 
 
+def words(path: pathlib.Path) -> int:
+    """The number of words of a page, with the documents and the parts that it includes."""
+    text = path.read_text(encoding="utf-8")
+    count = len(text.split()) + sum(words(path.parent / of) for of in pages.included(text))
+    for file, part in pages.parts(text):
+        found = re.search(rf"ANCHOR: {part}\b.*?\n(.*?)[^\n]*ANCHOR_END: {part}\b", (path.parent / file).read_text(encoding="utf-8"), re.S)
+        count += len(found[1].split())
+    return count
+
+
+def for_users() -> list[pathlib.Path]:
+    """README.md and the pages that users read one after another: not the references that are made, the format and the development."""
+    made = {pages.SOURCES / f"reference/{of}.md" for of in ("options", "python-api", "c-api", "typescript-api")}
+    others = ("format", "design", "development")
+    chosen = [path for path in pages.chapters() if path not in made and path.relative_to(pages.SOURCES).parts[0] not in others]
+    return [pages.ROOT / "README.md", *chosen]
+
+
 def count_words() -> list[str]:
     for path in pages.chapters():
-        print(f"{len(path.read_text(encoding='utf-8').split()):6} {name(path)}")
+        print(f"{words(path):6} {name(path)}")
+    print(f"{sum(map(words, for_users())):6} README.md and all that users read here")
     return []
 
 
