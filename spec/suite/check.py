@@ -106,7 +106,7 @@ def main(argv=None):
     for fault in faults:
         print(fault, file=sys.stderr)
     answers = sum(len(case["items"]) for case in chosen)
-    print(f"{len(chosen)} of {len(cases)} cases, {answers} answers proved by two ways, {len(faults)} faults")
+    print(f"{len(chosen)} of {len(cases)} cases, {answers} results proved by two ways, {len(faults)} faults")
     return 1 if faults or not chosen else 0
 
 

@@ -1,4 +1,4 @@
-"""Compares the reports of several runs, made by `run.py --json`: a CSV file of all questions, and a table in Markdown.
+"""Compares the reports of several runs, made by `run.py --json`: a CSV file of all queries, and a table in Markdown.
 
     python compare.py [--csv FILE] REPORT.json...
 """
@@ -9,8 +9,8 @@ import json
 import sys
 from pathlib import Path
 
-COUNTS = ("answers", "right", "missed", "invented", "otherwise wrong", "crashes, hangs", "refused", "undecided")
-COLUMNS = ("runner", "version", "question", *COUNTS, "error of the number", "error of the size")
+COUNTS = ("results", "right", "missed", "invented", "otherwise wrong", "crashes, hangs", "refused", "undecided")
+COLUMNS = ("runner", "version", "query", *COUNTS, "error of the number", "error of the size")
 
 
 def error(value):
@@ -18,7 +18,7 @@ def error(value):
 
 
 def rows_of(report):
-    """Returns a row of `COLUMNS` for each question of a report."""
+    """Returns a row of `COLUMNS` for each query of a report."""
     rows = []
     for ask, row in report["by_question"].items():
         keys = ("right", "false_negatives", "false_positives", "other_wrong", "garbage", "crashes", "hangs", "refused", "undecided", "unasked")
@@ -31,7 +31,7 @@ def rows_of(report):
 
 def summary(rows):
     """Returns a table in Markdown with a row for each runner."""
-    lines = ["| runner | version | questions | " + " | ".join(COUNTS) + " |", "|" + "---|" * (3 + len(COUNTS))]
+    lines = ["| runner | version | queries | " + " | ".join(COUNTS) + " |", "|" + "---|" * (3 + len(COUNTS))]
     for runner, version in dict.fromkeys((row[0], row[1]) for row in rows):
         of = [row for row in rows if row[0] == runner]
         totals = [sum(int(row[3 + k]) for row in of) for k in range(len(COUNTS))]
@@ -42,7 +42,7 @@ def summary(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("reports", nargs="+", type=Path)
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each question of each runner")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each query of each runner")
     arguments = parser.parse_args()
     reports = [json.loads(path.read_text(encoding="utf-8").splitlines()[-1]) for path in arguments.reports]
     rows = [row for report in reports for row in rows_of(report)]

@@ -1,4 +1,4 @@
-"""Compares an answer with the truth of its question."""
+"""Compares a result with the truth of its query."""
 
 from fractions import Fraction
 from math import isfinite

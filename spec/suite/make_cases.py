@@ -682,7 +682,7 @@ def main():
     (CASES / "meshes.jsonl").write_bytes("".join(lines).encode())
     answers = sum(len(case["items"]) for case in stated.values())
     bytes_written = sum(path.stat().st_size for path in CASES.glob("*.jsonl"))
-    print(f"{written} cases, {answers} answers, {bytes_written} bytes")
+    print(f"{written} cases, {answers} results, {bytes_written} bytes")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Puts the question of a case to both ways, and states or compares the truth.
+"""Runs the query of a case in both ways, and states or compares the truth.
 
 A truth is JSON: true, false or null; text; lists of pairs; or, for numbers, {"square": "p/q"} or {"exact": "p/q"} where that is
 short, and in all cases {"lower": hex, "upper": hex}, two floats, neighbours or equal, between which the number lies.

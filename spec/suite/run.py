@@ -1,9 +1,9 @@
-"""Asks a runner the questions of the suite, and counts what is wrong.
+"""Runs the queries of the suite on a runner, and counts what is wrong.
 
     python run.py --runner 'COMMAND' [--json]
 
-Needs Python 3.9 or later. Exits with 0 if all answers are right, with 1 if not, and with 2 if the runner does not start.
-`PROTOCOL.md` tells what a runner is asked.
+Needs Python 3.9 or later. Exits with 0 if all results are right, with 1 if not, and with 2 if the runner does not start.
+`PROTOCOL.md` says what a runner gets.
 """
 
 import argparse
@@ -247,13 +247,13 @@ def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runner", required=True, help="the command of the runner")
     parser.add_argument("--json", action="store_true", help="print one JSON object in place of the table")
-    parser.add_argument("--level", type=int, default=3, help="ask cases up to this level: 1 plain, 2 boundary, 3 hostile")
-    parser.add_argument("--tags", default="", help="ask only cases with one of these tags, separated by commas")
-    parser.add_argument("--questions", default="", help="ask only these questions, separated by commas")
-    parser.add_argument("--sample", type=positive, default=1, metavar="N", help="ask every Nth case")
-    parser.add_argument("--timeout", type=float, default=10.0, help="seconds for one answer")
+    parser.add_argument("--level", type=int, default=3, help="run cases up to this level: 1 plain, 2 boundary, 3 hostile")
+    parser.add_argument("--tags", default="", help="run only cases with one of these tags, separated by commas")
+    parser.add_argument("--questions", default="", help="run only these queries, separated by commas")
+    parser.add_argument("--sample", type=positive, default=1, metavar="N", help="run every Nth case")
+    parser.add_argument("--timeout", type=float, default=10.0, help="seconds for one query")
     parser.add_argument("--budget", type=float, default=570.0, help="seconds for everything; what is left then counts as unasked")
-    parser.add_argument("--examples", type=int, default=2, help="wrong answers to show for each question and kind")
+    parser.add_argument("--examples", type=int, default=2, help="wrong results to show for each query and kind")
     arguments = parser.parse_args(argv)
     arguments.until = time.monotonic() + arguments.budget
     meshes_by_name, cases = load()

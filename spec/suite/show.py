@@ -1,4 +1,4 @@
-"""Shows a proof of one answer that can be checked by hand, with the two triangles that decide it as fractions.
+"""Shows a proof of one result that can be checked by hand, with the two triangles that decide it as fractions.
 
     python show.py CASE ITEM [TRIANGLE_OF_A TRIANGLE_OF_B]
 
@@ -50,7 +50,7 @@ def both(case, meshes, item):
     if fault := prove.fault(case, meshes, item):
         sys.exit(f"to be refused: {fault}")
     if case["ask"] in ("penetration", "self_contacts") or item["truth"] == {"hit": False} or not all(meshes[case[key]][1] for key in ("a", "b") if key in case):
-        sys.exit(f"no two triangles decide this answer of {case['ask']}; check.py proves it")
+        sys.exit(f"no two triangles decide this result of {case['ask']}; check.py proves it")
     if "pose" in item:
         return prove.scene(case, meshes, item["pose"])
     if case["ask"] == "motion":

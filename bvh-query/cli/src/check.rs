@@ -29,11 +29,11 @@ found.
 
 --self-contacts also finds all pairs of triangles that meet where they should not. Two triangles may meet in the corners \
 and the edge that they have in common, and nowhere else. The kinds are crossing (no common corner), at_corner (one), \
-folded (they overlap on the same side of a common edge) and duplicate (the same corners). The answer is exact, and is no \
+folded (they overlap on the same side of a common edge) and duplicate (the same corners). The result is exact, and is no \
 error: the exit code is 0. With --json, the object has the field self_contacts: an object with the numbers of all pairs and \
 of each kind (count, crossing, at_corner, folded, duplicate) and with the first pairs (pairs: objects with kind, object_a, \
 triangle_a, object_b and triangle_b). A file without ids has lost its exact duplicates, and numbers triangles by place. In \
-a scene, each object is asked by itself.
+a scene, each object is checked by itself.
 
 If the file states which objects are closed, open ones are explained: how many edges have one triangle (boundary), two that face \
 opposite ways (flipped), or more that do not cancel (crowded); the first edges of each kind, with their triangles and both ends; and \

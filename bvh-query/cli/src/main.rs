@@ -2,7 +2,7 @@
 //!
 //! Each of these modules does one thing that a person does with the command: `bake` one output, or many `assets`;
 //! `dump`; `check`; `query`; `motion`; `probe`; `scene`; `robot`; `clash`; `view`; `suite`; `report`. They import these modules, which do not import them:
-//! `asking` (the common part of commands that ask questions), `options` (options of several commands), `process`
+//! `asking` (the common part of commands that run queries), `options` (options of several commands), `process`
 //! (memory, mapped files and signals) and `console` (output and exit codes). `cbvh --help` and the help of each
 //! command state what scripts may rely on.
 
@@ -79,23 +79,23 @@ enum Command {
     Validate(check::ValidateArguments),
     /// Check that a .cbvh file has the triangles of a mesh and that every bound contains its triangles
     Verify(check::VerifyArguments),
-    /// Ask whether and where two meshes touch, how far apart they are, and whether one is inside the other
+    /// Check whether and where two meshes touch, how far apart they are, and whether one is inside the other
     Query(query::QueryArguments),
-    /// Ask whether a motion between two poses is free at every moment, and when it first touches
+    /// Check whether a motion between two poses is free at every moment, and find when it first touches
     Motion(motion::MotionArguments),
-    /// Ask how far points are from a mesh, which of them are inside it, and what rays and segments hit
+    /// Compute how far points are from a mesh and which of them are inside it, and find what rays and segments hit
     Probe(probe::ProbeArguments),
-    /// Ask a scene of many placed meshes which of them touch, or how far apart they are
+    /// Find which of many placed meshes touch, or how far apart they are
     Scene(scene::SceneArguments),
-    /// Ask a robot about values of its joints: whether it touches itself or obstacles, how near it comes, and which motions are free
+    /// Check a robot by the values of its joints: whether it touches itself or obstacles, how near it comes, and which motions are free
     Robot(robot::RobotArguments),
     /// Find the parts of an assembly that touch, overlap, contain or come near each other, and how deep or how near
     Clash(clash::ClashArguments),
-    /// Write a page that shows meshes, a motion or a scene in a browser, and asks cbvh there
+    /// Write a page that shows meshes, a motion or a scene in a browser, and runs queries there
     View(view::ViewArguments),
-    /// Answer the questions of the public suite (spec/suite), one line in and one line out
+    /// Run the queries of the public suite (spec/suite), one line in and one line out
     Suite(suite::SuiteArguments),
-    /// Measure speed against error on your own meshes: for each layout, or for ways to ask about motions
+    /// Measure speed against error on your own meshes: for each layout, or for ways to check motions
     Report(report::ReportArguments),
 }
 

@@ -1,4 +1,4 @@
-//! `cbvh motion`: asks whether motions between two poses are free, and when they first touch.
+//! `cbvh motion`: checks whether motions between two poses are free, and when they first touch.
 
 use crate::asking::files::{self, read_all, read_motions, write_file};
 use crate::asking::mesh;
@@ -13,18 +13,18 @@ use std::path::PathBuf;
 const HELP: &str = "\
 Examples:
   cbvh motion room.cbvh robot.cbvh edges.txt --clearance 0.01
-  cbvh motion a.obj b.obj edges.txt --json > answers.jsonl
+  cbvh motion a.obj b.obj edges.txt --json > results.jsonl
   cbvh motion a.cbvh b.cbvh --motion \"1 0 0 9  0 1 0 0  0 0 1 0   1 0 0 0  0 1 0 0  0 0 1 0\" --witness w.obj
 
 Each line of a file of motions has 24 numbers: the pose of B in the frame of A at the start and at the end, each the rows of \
 a 3 by 4 matrix. The origin of B's frame moves on a line, and B turns about one axis the shorter way, both at a constant \
 rate, from time 0 to time 1. # starts a comment.
 
-Answers hold for every moment of the motion. free: the meshes do not touch. hit: the motion is certified free until the \
+Results hold for every moment of the motion. free: the meshes do not touch. hit: the motion is certified free until the \
 first time, and at the second time the meshes touch, or are at most --clearance apart. near: the motion is certified free \
 until the first time, and at the second time B is so close that neither free nor hit can be certified within --tolerance.
 
-One answer is printed per line, in the order of the motions: free, hit FREE_UNTIL TOUCHING_AT, or near FREE_UNTIL AT, the \
+One result is printed per line, in the order of the motions: free, hit FREE_UNTIL TOUCHING_AT, or near FREE_UNTIL AT, the \
 times with 17 digits. --json prints one object per motion: motion, its number in the file, from 0; motions, the name of the \
 file, if there are several; answer (free, hit or near), free_until, touching_at or at, and at that time the fields of cbvh \
 query --mode distance --json. --bench prints one object per file: the fields of cbvh query --bench, hits and near. --out \
@@ -44,12 +44,12 @@ pub(crate) struct MotionArguments {
     /// Meshes that are at most this far apart count as a hit, in mesh units
     #[arg(long, value_name = "C", default_value = "0", value_parser = not_negative, allow_negative_numbers = true)]
     clearance: f64,
-    /// How far beyond the clearance the answer may be near, in mesh units [default: 1e-6 of the smaller diagonal]
+    /// How far beyond the clearance the result may be near, in mesh units [default: 1e-6 of the smaller diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     tolerance: Option<f64>,
     #[command(flatten)]
     asking: AskingArguments,
-    /// Ask about one motion, given as 24 numbers, and print the answer for a person
+    /// Query one motion, given as 24 numbers, and print the result for a person
     #[arg(id = "one", long = "motion", value_name = "24 NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     motion: Option<String>,
     /// With --motion: write the closest triangles at a hit and the segment between them as OBJ

@@ -1,4 +1,4 @@
-//! `cbvh probe`: asks a mesh about files of points, rays or segments, or about one.
+//! `cbvh probe`: runs queries about a mesh, for files of points, rays or segments, or for one of these.
 
 use crate::asking::files::{self, numbers, read_all, read_lines};
 use crate::asking::mesh::{self, LoadedMesh};
@@ -27,9 +27,9 @@ where parts overlap, the closest one may be inside. side is defined for meshes t
 and consistently oriented; for others it is undefined, except on the surface. A ray or a segment that only touches an edge or \
 a corner hits the mesh.
 
-One answer is printed per line, in the order of the questions: with --mode closest the distance; with side 1 inside, 0 on \
+One result is printed per line, in the order of the file: with --mode closest the distance; with side 1 inside, 0 on \
 the mesh, -1 outside, 2 undefined; with ray the parameter of the first hit in units of the direction, or -1; with segment 1 \
-if it meets the mesh, 0 if not. --json prints one object per question: probe, its number in the file, from 0; probes, the \
+if it meets the mesh, 0 if not. --json prints one object per line: probe, its number in the file, from 0; probes, the \
 name of the file, if there are several; distance (closest), side, hit and t (ray) or meets (segment); and of a closest point \
 and of a hit lower, upper, point, object and triangle. --bench prints one object per file: the fields of cbvh query --bench \
 for one mesh; positives counts points on the mesh with --mode closest, points inside it with side, rays that hit it with ray, \
@@ -45,12 +45,12 @@ pub(crate) struct ProbeArguments {
     /// Files of points, rays or segments, separated by commas
     #[arg(value_name = "FILE[,FILE...]", required_unless_present = "one", conflicts_with = "one")]
     files: Option<String>,
-    /// The question
+    /// The query
     #[arg(long, value_enum, default_value = "closest")]
     mode: Mode,
     #[command(flatten)]
     asking: AskingArguments,
-    /// Ask about one point, ray or segment, given as 3 or 6 numbers, and print the answer for a person
+    /// Query one point, ray or segment, given as 3 or 6 numbers, and print the result for a person
     #[arg(id = "one", long = "probe", value_name = "3 OR 6 NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     probe: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `cbvh query`: asks two meshes about files of poses, or about one pose.
+//! `cbvh query`: runs queries about two meshes, for files of poses or for one pose.
 
 use crate::asking::files::{self, read_all, read_poses, write_file};
 use crate::asking::mesh::{self, LoadedMesh};
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 
 const HELP: &str = "\
 Examples:
-  cbvh query a.cbvh b.cbvh poses.txt --mode collide > answers.txt
+  cbvh query a.cbvh b.cbvh poses.txt --mode collide > results.txt
   cbvh query a.obj b.obj near.txt,far.txt --mode distance --json
   cbvh query bin.cbvh part.cbvh poses.txt --mode relation
   cbvh query a.cbvh b.cbvh --mode distance --pose \"1 0 0 2  0 1 0 0  0 0 1 0\" --witness w.obj
@@ -25,8 +25,8 @@ Examples:
 Each line of a pose file has 12 numbers: the rows of the 3 by 4 matrix that places B in the frame of A. The first three \
 numbers of a row are the rotation and the fourth is the translation, in mesh units. # starts a comment.
 
-One answer is printed per line, in the order of the poses: collide and within 0 or 1, contacts the number of pairs of \
-triangles, distance the distance in mesh units (17 digits), relation a number, penetration and signed five numbers. The answer about a single pose is printed as \
+One result is printed per line, in the order of the poses: collide and within 0 or 1, contacts the number of pairs of \
+triangles, distance the distance in mesh units (17 digits), relation a number, penetration and signed five numbers. The result for a single pose is printed as \
 text for a person.
 
 collide is about surfaces: a mesh that is inside another without touching it does not collide. relation is 0 touching, \
@@ -45,9 +45,9 @@ signed (false if a mesh encloses nothing), or distance, lower, upper, point_a, \
 point_b, object_a, triangle_a, object_b, triangle_b. The true distance lies between lower and upper, and points are in the \
 frame of A. If a file has moved vertices, given_lower and given_upper are bounds for the meshes that were given.
 
---bench prints one object per file: what was asked, the times of the queries, positives (all answers of relation but 1 and 5) \
-and answers_xxh3, a hash of the answers, which is the same for every --isa and --jobs. It is null if --budget cut the run \
-short, or if --rel-err or --abs-err allow several answers. --out writes the lines, each with its nanoseconds; %s stands for the name of the file.";
+--bench prints one object per file: the query, the times, positives (all results of relation but 1 and 5) \
+and answers_xxh3, a hash of the results, which is the same for every --isa and --jobs. It is null if --budget cut the run \
+short, or if --rel-err or --abs-err allow several results. --out writes the lines, each with its nanoseconds; %s stands for the name of the file.";
 
 /// What `query` accepts.
 #[derive(Debug, Args)]
@@ -60,21 +60,21 @@ pub(crate) struct QueryArguments {
     /// Pose files, separated by commas. Without them, both meshes are in one frame
     #[arg(value_name = "POSES[,POSES...]", conflicts_with = "one")]
     poses: Option<String>,
-    /// The question
+    /// The query
     #[arg(long, value_enum, default_value = "collide")]
     mode: Mode,
     /// With --mode within: the distance to compare with, in mesh units
     #[arg(long, value_name = "D", value_parser = not_negative, allow_negative_numbers = true)]
     within: Option<f64>,
-    /// With --mode distance: the answer may exceed the least distance by this fraction of it
+    /// With --mode distance: the result may exceed the least distance by this fraction of it
     #[arg(long, value_name = "R", value_parser = not_negative, allow_negative_numbers = true)]
     rel_err: Option<f64>,
-    /// With --mode distance: the answer may exceed the least distance by this length, in mesh units
+    /// With --mode distance: the result may exceed the least distance by this length, in mesh units
     #[arg(long, value_name = "E", value_parser = not_negative, allow_negative_numbers = true)]
     abs_err: Option<f64>,
     #[command(flatten)]
     asking: AskingArguments,
-    /// Ask about one pose, given as 12 numbers, and print the answer for a person
+    /// Query one pose, given as 12 numbers, and print the result for a person
     #[arg(id = "one", long = "pose", value_name = "12 NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     pose: Option<String>,
     /// With --mode distance about one pose: write both closest triangles and the segment between them as OBJ

@@ -1,4 +1,4 @@
-"""Makes the meshes of the timed questions: the same bytes on every machine.
+"""Makes the meshes of the timed queries: the same bytes on every machine.
 
 Only operations that IEEE 754 rounds correctly are used, one after another: sums, products, quotients and square roots. Nothing is
 left to a mathematical library or to the order of a sum. Coordinates are rounded to single precision, so all libraries hold the same

@@ -1,4 +1,4 @@
-"""Finds the poses of the timed questions and proves their gaps, or proves again those that are there.
+"""Finds the poses of the timed queries and proves their gaps, or proves again those that are there.
 
     python poses.py make [--jobs N] [PAIR ...]       writes poses/PAIR.jsonl, with the proved bounds of each gap
     python poses.py check [--jobs N] [--sample N] [PAIR ...]

@@ -1,4 +1,4 @@
-"""Makes the rays and points of the timed questions, and proves their answers, or proves again those that are there.
+"""Makes the rays and points of the timed queries, and proves their results, or proves again those that are there.
 
     python probes.py make [--jobs N] [MESH ...]       writes probes/MESH.jsonl
     python probes.py check [--jobs N] [--sample N] [MESH ...]
@@ -269,7 +269,7 @@ def main(argv=None):
     parser.add_argument("what", choices=("make", "check"))
     parser.add_argument("meshes", nargs="*", metavar="MESH")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--sample", type=int, default=1, metavar="N", help="check every Nth answer")
+    parser.add_argument("--sample", type=int, default=1, metavar="N", help="check every Nth result")
     arguments = parser.parse_intermixed_args(argv)
     total, wrong = 0, []
     with multiprocessing.Pool(arguments.jobs) as pool:
@@ -277,11 +277,11 @@ def main(argv=None):
             if arguments.what == "make":
                 path(name).parent.mkdir(exist_ok=True)
                 path(name).write_text("".join(json.dumps(line) + "\n" for line in found), encoding="utf-8")
-                print(f"{name}: {sum(len(line.get('proved', ())) for line in found)} answers", flush=True)
+                print(f"{name}: {sum(len(line.get('proved', ())) for line in found)} results", flush=True)
             else:
                 total, wrong = total + found[0], wrong + found[1]
     if arguments.what == "check":
-        print("\n".join([*wrong, f"{total} answers, {len(wrong)} wrong"]))
+        print("\n".join([*wrong, f"{total} results, {len(wrong)} wrong"]))
     return 1 if wrong or (arguments.what == "check" and total == 0) else 0
 
 

@@ -36,8 +36,8 @@ PROBED = {
 }
 # What the summary is about: meshes that just touch, that are just apart, and that are near.
 SHORT = {("collide", "touching"): "collide, touching", ("collide", "0.0001%"): "collide, 0.0001 % apart", ("distance", "1%"): "distance, 1 % apart"}
-# What it costs until a mesh that was never seen has its first answer.
-FIRST_COSTS = ("build, ms", "first answer from the mesh, ms")
+# What it costs until a mesh that was never seen has its first result.
+FIRST_COSTS = ("build, ms", "first result from the mesh, ms")
 SCALING = ("scan-1k", "scan-10k", "scan-100k")
 
 
@@ -164,7 +164,7 @@ def wrong_table(cells):
         for name, cell in cells[key].items():
             if cell.wrong:
                 rows.setdefault((*key, f"{len(cell.wrong)} of {cell.poses}"), []).append(name)
-    return table(["libraries", "question", "pair", "gap", "wrong"], [["; ".join(names), *row] for row, names in rows.items()])
+    return table(["libraries", "query", "pair", "gap", "wrong"], [["; ".join(names), *row] for row, names in rows.items()])
 
 
 def batch_table(batches):
@@ -189,7 +189,7 @@ def queries_file(cells):
     for question in QUESTIONS:
         for key in ordered(cells, question):
             rows += [[*key, name, cell.poses, len(cell.wrong), *(f"{x / 1000:.2f}" for x in (cell.median, cell.p99, cell.cold))] for name, cell in cells[key].items()]
-    return comma_separated(["question", "pair", "gap", "library", "poses", "wrong", "median", "99th percentile", "cold"], rows)
+    return comma_separated(["query", "pair", "gap", "library", "poses", "wrong", "median", "99th percentile", "cold"], rows)
 
 
 def costs(record):
@@ -200,7 +200,7 @@ def costs(record):
     field, first = record.get("field_seconds", 0), record["first_nanoseconds"]
     ready = lambda seconds: None if seconds is None or first is None else 1e3 * (seconds + field) + first / 1e6
     per_triangle = None if size is None else size / sum(record["triangles"].values())
-    return {"build, ms": 1e3 * (built + field), "bytes per triangle": per_triangle, "first answer from the mesh, ms": ready(built), "first answer from a file, ms": ready(opened)}
+    return {"build, ms": 1e3 * (built + field), "bytes per triangle": per_triangle, "first result from the mesh, ms": ready(built), "first result from a file, ms": ready(opened)}
 
 
 def short(value):
@@ -231,7 +231,7 @@ def least_other(builds, record, name, subject):
 
 
 def lost_builds(builds, subject):
-    """Returns a row for each pair or mesh, and the options of the subject, where another library builds faster or gives the first answer from the mesh sooner."""
+    """Returns a row for each pair or mesh, and the options of the subject, where another library builds faster or gives the first result from the mesh sooner."""
     rows = []
     for record in (record for record in builds if is_own(record["runner"], subject)):
         cells = []
@@ -272,9 +272,9 @@ def probed_table(probed, question, is_batch, names, subject):
 def probed_lines(builds, probed, names, subject):
     """Returns the section about rays and points."""
     checked = max(cell.checked for row in probed.values() for cell in row.values())
-    lines = ["", "## Rays and points", "", "Nanoseconds for each ray or point, on the same core: one by one the median over them, in one call the mean, which is larger where some answers take",
-             "long. *best other* is the fastest other library that is right. Libraries in Python are asked in one call only, because a call from Python costs",
-             f"more than an answer. Of each kind, {checked:,} answers are checked."]  # fmt: skip
+    lines = ["", "## Rays and points", "", "Nanoseconds for each ray or point, on the same core: one by one the median over them, in one call the mean, which is larger where some queries take",
+             "long. *best other* is the fastest other library that is right. Libraries in Python get all in one call only, because a call from Python costs",
+             f"more than a query. Of each kind, {checked:,} results are checked."]  # fmt: skip
     for question, title in PROBED.items():
         if any(key[0] == question for key in probed):
             lines += ["", f"### {title} (`{question}`)"]
@@ -295,7 +295,7 @@ def probes_file(probed):
     for (question, is_batch, mesh, kind), row in probed.items():
         for name, cell in row.items():
             rows.append([question, "one call" if is_batch else "one by one", mesh, kind, name, cell.threads, cell.count, cell.checked, len(cell.wrong), *(f"{x:.1f}" for x in (cell.median, cell.p99, cell.cold))])
-    return comma_separated(["question", "asked", "mesh", "kind", "library", "threads", "count", "checked", "wrong", "median", "99th percentile", "cold"], rows)
+    return comma_separated(["query", "calls", "mesh", "kind", "library", "threads", "count", "checked", "wrong", "median", "99th percentile", "cold"], rows)
 
 
 def plot(title, labels, lines, x_title, colours):
@@ -354,7 +354,7 @@ def page(head, builds, batches, failed, cells, probed, subject, drawn, folder, r
     of_size = lambda file: file.endswith("-scaling.svg")
     lines = ["# Speed", "", *marked("made", [f"Made on {head['date']} by `speed/run.py` with version {head['suite']} of the suite, {where}."]), "",
              "Times are medians over the poses, in microseconds. The gap is a part of the diagonal of A's box. *far* is 100 diagonals away, where",
-             f"`collide` shows the cost of a call. By the proofs, {wrong + probed_wrong or 'no'} answers are wrong, counted once for each pose, ray and point. A library with a wrong answer in a cell",
+             f"`collide` shows the cost of a call. By the proofs, {wrong + probed_wrong or 'no'} results are wrong, counted once for each pose, ray and point. A library with a wrong result in a cell",
              f"is not counted as best there. [queries.csv]({folder}queries.csv)"
              + (f", [probes.csv]({folder}probes.csv)" if probed else "")
              + f" and [builds.csv]({folder}builds.csv) have all times.", f"[What is timed]({readme})", "",
@@ -364,18 +364,18 @@ def page(head, builds, batches, failed, cells, probed, subject, drawn, folder, r
     lines += [f"## Where {subject} loses", ""]
     told = [f"No other library is faster in any of {compared} comparisons of queries."]
     if lost:
-        told = [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["question", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
+        told = [f"In {len(lost)} of {compared} comparisons of queries, another library is faster.", "", *table(["query", "pair", "gap", subject, "faster", "its time", "times as fast"], lost)]
     if probed:
         if lost := probed_losses(probed, subject):
             told += ["", f"In {len(lost)} of {probed_compared} comparisons of rays and points, another library is faster, in nanoseconds:", ""]
-            told += table(["question", "mesh", "kind", subject, "faster", "its time", "times as fast"], lost)
+            told += table(["query", "mesh", "kind", subject, "faster", "its time", "times as fast"], lost)
         else:
             told += ["", f"No other library is faster in any of {probed_compared} comparisons of rays and points."]
     if lost := lost_builds(builds, subject):
-        told += ["", "Other libraries build faster, or give the first answer from the mesh sooner, build included:", ""]
+        told += ["", "Other libraries build faster, or give the first result from the mesh sooner, build included:", ""]
         told += table(["pair", "options", *(head for name in FIRST_COSTS for head in (name, "faster", "times as fast"))], lost)
     lines += marked("losses", told)
-    lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes that answers correctly."]
+    lines += ["", "## All gaps", "", f"How many times as long as {subject} the fastest other library takes whose results are right."]
     for question, title in QUESTIONS.items():
         if any(key[0] == question for key in cells):
             lines += ["", f"### {title} (`{question}`)", "", *ratio_table(cells, question, subject)]
@@ -384,12 +384,12 @@ def page(head, builds, batches, failed, cells, probed, subject, drawn, folder, r
     if probed:
         lines += probed_lines(builds, probed, list(head["runners"]), subject)
     if wrong:
-        lines += ["", "## Wrong answers", "", *wrong_table(cells)]
+        lines += ["", "## Wrong results", "", *wrong_table(cells)]
     starts = head.get("starts", 1)
     often = f" Costs are those of the median of {starts} builds." if starts > 1 else ""
-    lines += ["", "## Builds, memory, and the first answer", "", "All meshes of a pair together; a mesh of rays and points by itself. Bytes are the growth of resident memory, or of the library's file where it maps one." + often, "", *build_table(builds, subject)]
+    lines += ["", "## Builds, memory, and the first result", "", "All meshes of a pair together; a mesh of rays and points by itself. Bytes are the growth of resident memory, or of the library's file where it maps one." + often, "", *build_table(builds, subject)]
     if batches:
-        lines += ["", "## Many poses in one call, on all cores", "", "The time per query, by question and gap.", "", *batch_table(batches)]
+        lines += ["", "## Many poses in one call, on all cores", "", "The time per query, by kind and gap.", "", *batch_table(batches)]
     if failed:
         lines += ["", "## Failures", "", *(f"- {one}" for one in failed)]
     lines += ["", "## Libraries", "", *table(["name", "version", "settings"], [[name, str(of["version"]), str(of["settings"])] for name, of in head["runners"].items()])]

@@ -1,4 +1,4 @@
-"""Times libraries on the same meshes and poses, one query after another, and checks each answer against what is proved.
+"""Times libraries on the same meshes and poses, one query after another, and checks each result against what is proved.
 
     python run.py --out DIR [--core 1] [--only PATTERN] [--runner NAME=COMMAND ...]
     python run.py --out DIR --smoke --runner NAME=COMMAND           seconds: few poses of two small pairs, few rays and points
@@ -388,13 +388,13 @@ def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="the folder for the raw times, the tables and the plots")
     parser.add_argument("--page", help="the file of the page with the tables; DIR/SPEED.md")
-    parser.add_argument("--runner", action="append", metavar="NAME=COMMAND", help="ask this runner only; may be repeated")
+    parser.add_argument("--runner", action="append", metavar="NAME=COMMAND", help="measure this runner only; may be repeated")
     parser.add_argument("--bin", default="target/speed/bin", help="the folder of the runners that setup has built")
     parser.add_argument("--only", default="", help="only pairs with one of these texts in their name, separated by commas; rays and points of a mesh are probes/MESH")
     parser.add_argument("--rounds", type=int, default=5, help="rounds after the first, which counts as cold")
     parser.add_argument("--starts", type=int, default=3, help="starts of each runner for each pair or mesh; the costs of builds are those of the median")
     parser.add_argument("--sample", type=int, default=1, metavar="N", help="every Nth pose")
-    parser.add_argument("--budget", type=float, default=1.0, help="seconds after which a round of one question begins no other pose")
+    parser.add_argument("--budget", type=float, default=1.0, help="seconds after which a round of one query begins no other pose")
     parser.add_argument("--core", type=int, help="the core to which runners are pinned, where there is taskset")
     parser.add_argument("--smoke", action="store_true", help="few poses of small pairs: does everything work?")
     arguments = parser.parse_args(argv)
@@ -420,14 +420,14 @@ def main(argv=None):
                     except forms.Missing as missing:
                         print(f"{name}: skipped, {missing}", file=sys.stderr)
         except (Crashed, Hung, Garbage, OSError, ValueError) as failure:
-            print(f"expected runners that answer, found {type(failure).__name__} {failure}", file=sys.stderr)
+            print(f"expected runners that return results, found {type(failure).__name__} {failure}", file=sys.stderr)
             return 2
         finally:
             for runner in runners:
                 runner.stop()
     page = arguments.page or str(arguments.out / "SPEED.md")
     report.main([str(arguments.out), "--page", page])
-    print(f"{measurement.asked} answers, {measurement.wrong} wrong, {measurement.failed} runners failed; see {page}")
+    print(f"{measurement.asked} results, {measurement.wrong} wrong, {measurement.failed} runners failed; see {page}")
     return 0 if measurement.asked and not measurement.wrong and not measurement.failed else 1
 
 

@@ -32,8 +32,8 @@ class Checks(unittest.TestCase):
 
     def test_the_documents_state_the_counts(self):
         text = (SUITE / "README.md").read_text(encoding="utf-8")
-        answers = sum(len(case["items"]) for case in self.cases)
-        self.assertIn(f"asks a library {answers:,} such questions in {len(self.cases):,} cases", " ".join(text.split()))
+        queries = sum(len(case["items"]) for case in self.cases)
+        self.assertIn(f"runs {queries:,} queries in {len(self.cases):,} cases", " ".join(text.split()))
         for path in (SUITE / "cases").iterdir():
             self.assertIn(f"| `{path.stem}` |", text)
         version = (SUITE / "VERSION").read_text().strip()

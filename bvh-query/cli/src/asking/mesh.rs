@@ -103,7 +103,7 @@ impl LoadedMesh {
 pub(crate) fn point_out_move(path: &Path, shape: Shape<'_>) {
     let (path, most) = (path.display(), shape.max_move());
     if most > 0.0 {
-        tell_line(&format!("{path}: vertices moved by up to {most:e}; answers are about the mesh as stored"));
+        tell_line(&format!("{path}: vertices moved by up to {most:e}; results are for the mesh as stored"));
     }
 }
 
@@ -169,7 +169,7 @@ pub(crate) fn refuse_scene(path: &Path, bvh: &Bvh) -> Result<(), Failure> {
     if !bvh.layout().has_instances() {
         return Ok(());
     }
-    let what = "expected a mesh, or one object of a scene, found a scene; cbvh scene asks about it, and cbvh dump lists \
+    let what = "expected a mesh, or one object of a scene, found a scene; cbvh scene queries it, and cbvh dump lists \
                 its objects";
     Err(Failure::invalid(path, what))
 }

@@ -1,4 +1,4 @@
-//! The common part of the commands that ask questions: meshes, files of questions, the run, and how answers are
+//! The common part of the commands that run queries: meshes, files of queries, the run, and how results are
 //! printed.
 
 pub(crate) mod files;
@@ -190,21 +190,21 @@ pub(crate) struct RunArguments {
     /// The instruction set: auto, scalar, avx2, avx512, neon or simd128. auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
     pub(crate) isa: String,
-    /// The number of threads: they share the questions of a file, or the pairs of each frame of a scene
+    /// The number of threads: they share the queries of a file, or the pairs of each frame of a scene
     #[arg(long, value_name = "N", default_value = "1", value_parser = threads, allow_negative_numbers = true)]
     pub(crate) jobs: u16,
     #[command(flatten)]
     pub(crate) layout: LayoutArguments,
-    /// Stop after this many seconds, for each file of questions
+    /// Stop after this many seconds, for each file of queries
     #[arg(long, value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
     pub(crate) budget: Option<f64>,
-    /// Untimed questions before the timed ones, taken from the end of the file
+    /// Untimed queries before the timed ones, taken from the end of the file
     #[arg(long, value_name = "N", default_value = "3", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub(crate) warm: usize,
-    /// Ask only the first N questions of each file; 0 asks all
+    /// Run only the first N queries of each file; 0 runs all
     #[arg(long, value_name = "N", default_value = "0", value_parser = whole::<usize>, allow_negative_numbers = true)]
     pub(crate) limit: usize,
-    /// Print one JSON object per question, with everything that the answer has
+    /// Print one JSON object per query, with everything that the result has
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -220,13 +220,13 @@ pub(crate) struct AskingArguments {
     /// Query only the object of this name, in each mesh that has one
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
-    /// Write raw answers and times to this file; %s stands for the name of the file of questions
+    /// Write raw results and times to this file; %s stands for the name of the file of queries
     #[arg(long, value_name = "raw_%s.txt")]
     pub(crate) out: Option<String>,
     /// How the system reads .cbvh files from the disk
     #[arg(long, value_name = "HOW", default_value = "usual", value_parser = read_ahead())]
     read_ahead: ReadAhead,
-    /// Print one JSON object per file, with the times of its questions, and no answers
+    /// Print one JSON object per file, with the times of its queries, and no results
     #[arg(long, conflicts_with = "json")]
     bench: bool,
 }
@@ -235,7 +235,7 @@ impl AskingArguments {
     /// Refuses what only files of questions need.
     pub(crate) fn require_no_files(&self) -> Result<(), Failure> {
         if self.bench || self.out.is_some() {
-            return Err(Failure::usage("--bench and --out require a file of questions"));
+            return Err(Failure::usage("--bench and --out require a file of queries"));
         }
         Ok(())
     }

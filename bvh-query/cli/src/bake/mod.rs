@@ -136,7 +136,7 @@ from the same inputs with the same options by the same version; --force bakes it
 With --scene the output is a scene: it also states where the objects stand in the world. Each node of a glTF or COLLADA file that has a \
 mesh becomes an instance. Nodes share their meshes: the file has one object for each mesh and scale. Each object of other \
 files becomes an instance where it stands. An instance has the name of its node; .2, .3 and so on are added to a name that \
-occurs again. cbvh scene asks about such a file.
+occurs again. cbvh scene queries such a file.
 
 --round f32 rounds each coordinate to the nearest f32 number, ties to even, as games store them. Numbers that are equal in two \
 files then stay equal, so that parts which share a face touch, and the origin of each object is 0. The output states how far \
@@ -156,7 +156,7 @@ expect, such as bytes that it left out.
 
 An XYZ file has a point per line; what follows its three numbers is ignored. A line with the number of points and one with \
 the names of the columns may come first. Each point becomes a triangle whose corners are \
-equal, and points that coincide all stay. --radius and --solid are kept in the file, and every question respects them.
+equal, and points that coincide all stay. --radius and --solid are kept in the file, and every query respects them.
 
 A COLLADA file is scaled to metres and turned so that z points up, by the unit and the axis that it declares. What is \
 done is reported as a warning.
@@ -226,7 +226,7 @@ pub(crate) struct BakeArguments {
     pub(crate) shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) layout: LayoutArguments,
-    /// Time spent on a better tree: quick or default. Answers are the same
+    /// Time spent on a better tree: quick or default. Results are the same
     #[arg(long, value_name = "E", default_value = "default", value_parser = effort)]
     pub(crate) effort: Effort,
     /// With --triangles quantized: how far a vertex may move, in mesh units [default: 1e-5 of the diagonal]
@@ -265,7 +265,7 @@ pub(crate) struct BakeArguments {
     /// Leave out the original triangle numbers
     #[arg(long)]
     pub(crate) no_ids: bool,
-    /// Do not store which objects are closed, which questions about what is inside a mesh need
+    /// Do not store which objects are closed, which queries about the inside of a mesh need
     #[arg(long)]
     pub(crate) no_topology: bool,
     /// Bake even if the output is up to date
@@ -274,7 +274,7 @@ pub(crate) struct BakeArguments {
     /// Print one JSON object, and one per stage on standard error
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print nothing but errors, warnings, and what --json asks for
+    /// Print nothing but errors, warnings, and the object of --json
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }

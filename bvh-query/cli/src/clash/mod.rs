@@ -1,4 +1,4 @@
-//! `cbvh clash`: asks which parts of an assembly touch, overlap, contain or come near each other.
+//! `cbvh clash`: finds which parts of an assembly touch, overlap, contain or come near each other.
 
 mod baseline;
 mod bcf;
@@ -66,9 +66,9 @@ of the last one. Flush parts then overlap or come apart by as much. Whether plac
 exactly, which takes about as long as whether they touch. With a tolerance of 0, only parts with a common point touch.
 
 A part that is the same as an earlier one, with the same bits of its pose, is reported once, as a duplicate of that one. It is \
-not asked about other parts, because they clash with the earlier one in the same way.
+not compared with other parts, because they clash with the earlier one in the same way.
 
---json prints one object: inputs, units, clearance, tolerance, parts, copies (those that are not asked about others), triangles, \
+--json prints one object: inputs, units, clearance, tolerance, parts, copies (those that are not compared with others), triangles, \
 seconds, classes (the number of clashes of each), and clashes. A clash has id, class, a, b, relation (as cbvh query numbers it), \
 distance, lower and upper (the bounds of the depth, 0 for parts that touch across a gap), translation (what moves b out of a) and point, both in the world. What \
 there is not is null. With --magnitudes, a clash that has them also has volume, volume_error, area (of a's surface and of b's), \
@@ -76,7 +76,7 @@ pierced (the thickness of a and of b), box (its corners), and reason (why there 
 apostrophe, has an apostrophe before it. The id is a hash of both names, and stays the same while they do.
 
 --baseline compares with an earlier --json. Each clash gets a status: new, changed (another class, or a distance or a bound that \
-differs by more than the tolerance) or same; gone has those that are no more. Ask with the same --clearance. --fail-on is then about new and changed ones only.
+differs by more than the tolerance) or same; gone has those that are no more. Use the same --clearance for both. --fail-on is then about new and changed ones only.
 
 --bcf writes BCF 2.1 for CAD and BIM tools: a topic for each clash, with a view of it in which both parts are selected. Its \
 identifiers follow from the id. Such tools take mesh units for metres, and z for up. SOURCE_DATE_EPOCH sets its date.
@@ -85,7 +85,7 @@ identifiers follow from the id. Such tools take mesh units for metres, and z for
 
 Each line of a manifest is a JSON object such as {\"file\": \"arm.cbvh\", \"name\": \"left arm\", \"pose\": [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, \
 1, 0]}. The pose has the rows of the matrix [R | t]; it and the name may be missing. Files are relative to the manifest. With \
---shard I/N, only pairs whose earlier part is among every N-th part are asked, so that the clashes of all shards are those of \
+--shard I/N, only pairs whose earlier part is among every N-th part are checked, so that the clashes of all shards are those of \
 the whole. Each .cbvh file is opened when it is first needed, so that memory stays low; other meshes are baked by each shard.
 
 --fail-on exits with code 5 after everything else is done.";
@@ -100,7 +100,7 @@ pub(crate) struct ClashArguments {
     /// Read the files of parts, their names and poses from this file, one JSON object per line
     #[arg(long, value_name = "PARTS.jsonl")]
     manifest: Option<PathBuf>,
-    /// Ask only the pairs whose earlier part is every N-th one, starting with the I-th; I is from 1 to N
+    /// Check only the pairs whose earlier part is every N-th one, starting with the I-th; I is from 1 to N
     #[arg(long, value_name = "I/N", value_parser = Shard::parse)]
     shard: Option<Shard>,
     /// Also find parts that are at most this far apart, in mesh units
@@ -212,7 +212,7 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
         ClashOptions::new().clearance(arguments.clearance).tolerance(tolerance).visits(arguments.visits);
     let by_volume = arguments.sort == "volume";
     let options = options.magnitudes(arguments.magnitudes || by_volume || arguments.min_volume.is_some());
-    spinner.set_message(format!("asking about {} parts", assembly.parts.len()));
+    spinner.set_message(format!("checking {} parts", assembly.parts.len()));
     let (mut scene, numbers) = assembly.scene(backend)?;
     scene.set_parallel(is_parallel);
     let part_of = |id: bvh_query::InstanceId| numbers[id.to_bits() as usize];
@@ -403,7 +403,7 @@ impl Answer<'_> {
         text += &(self.sum() + "\n");
         if self.copies() > 0 {
             let copies = self.copies();
-            text += &format!("copies of earlier parts in their places, not asked about others: {copies}\n");
+            text += &format!("copies of earlier parts in their places, not compared with others: {copies}\n");
         }
         text
     }

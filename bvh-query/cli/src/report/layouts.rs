@@ -46,7 +46,7 @@ in both time and error. Errors are relative to the exact distance of the mesh, o
 <li>Node tests compare up to 16 pairs of bounding volumes at once, packet tests up to 16 pairs of triangles; what these \
 cannot decide goes to exact tests, each of one pair of triangles.</li>
 <li>The figures are of one machine on one day. They depend on the mix of poses near contact and far apart, and files that \
-are not in memory yet take longer to answer first.</li>";
+are not in memory yet take longer in their first queries.</li>";
 
 /// A question about two meshes in a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]

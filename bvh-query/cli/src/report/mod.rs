@@ -1,4 +1,4 @@
-//! `cbvh report`: speed against error on some meshes, of each layout or of each way to ask about a motion.
+//! `cbvh report`: speed against error on some meshes, of each layout or of each way to check a motion.
 //!
 //! `layouts` and `motions` are the two kinds of report. Both make rows of named figures, from which everything else is
 //! written: a table, JSON, a drawing and a page for people. They use `inputs`, `made` poses and motions, and `timing`.
@@ -43,16 +43,16 @@ too: long motions, short motions, slides and turns on the spot.
 
 The command writes report.html for people, report.svg with its plots, and report.csv and report.json with the same \
 figures. view-1.html shows the first pair as cbvh view does, view-2.html the second one, and so on: in the first pose that touches or else \
-in the nearest one, with --motions where the first hit touches. Pairs whose files have more than 32 MiB have no such page. If an answer is wrong, the exit code is 3 and the files are written nevertheless.
+in the nearest one, with --motions where the first hit touches. Pairs whose files have more than 32 MiB have no such page. If a result is wrong, the exit code is 3 and the files are written nevertheless.
 
-Without --motions, it bakes each pair in every profile with every encoding of triangles, and asks for contact and for \
-distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All answers are compared with those of dop14-f32.
+Without --motions, it bakes each pair in every profile with every encoding of triangles, and computes contact and \
+distances with allowed errors of 0, 0.1 %, 1 % and 10 %. All results are compared with those of dop14-f32.
 
-With --motions, it bakes each pair as bake does without options, and asks about each motion in nine ways: by 10, 30, 100, \
-300, 1000, 3000 and 10000 equally spaced poses until one touches, and by certified answers, for the first contact and for \
+With --motions, it bakes each pair as bake does without options, and checks each motion in nine ways: by 10, 30, 100, \
+300, 1000, 3000 and 10000 equally spaced poses until one touches, and by certified queries, for the first contact and for \
 any. The report says how many of the certified contacts \
 the samples miss, how late they find the others, and how long each way takes. A sample that touches where the motion is \
-certified free is a wrong answer. Each way asks about all motions of a pair in one round, and in as many \
+certified free is a wrong result. Each way checks all motions of a pair in one round, and in as many \
 further rounds as fit into 10 seconds; report.csv has their number. A pair takes some minutes at most, unless one round of \
 10000 samples takes longer.
 
@@ -77,16 +77,16 @@ pub(crate) struct ReportArguments {
     /// the pair's name
     #[arg(long, value_name = "FILE[,FILE...]", num_args = 0..=1, require_equals = true, conflicts_with = "poses")]
     motions: Option<Option<String>>,
-    /// The largest number of poses or motions per pair, spread evenly over all; 0 asks all
+    /// The largest number of poses or motions per pair, spread evenly over all; 0 takes all
     #[arg(long, value_name = "N", default_value = "100")]
     limit: usize,
-    /// Rounds in which all layouts, or all ways to ask, take turns
+    /// Rounds in which all layouts, or all ways to check, take turns
     #[arg(long, value_name = "N", default_value = "7", value_parser = clap::value_parser!(u16).range(1..=1000))]
     rounds: u16,
     /// Backend: auto, scalar, avx2, avx512, neon or simd128; auto is the fastest one of this CPU, unless CBVH_ISA names one
     #[arg(long, value_name = "ISA", default_value = "auto")]
     isa: String,
-    /// Ask only about ten poses or motions in two rounds: good for trying the command, too few to quote
+    /// Take only ten poses or motions in two rounds: good for trying the command, too few to quote
     #[arg(long, conflicts_with_all = ["limit", "rounds"])]
     quick: bool,
 }
@@ -301,14 +301,14 @@ impl Report {
         }
         let counted = |count: usize, word| console::counted(count as u64, word);
         let (pairs, rows) = (counted(sections.len(), "pair"), counted(json.rows.len(), "row"));
-        let wrong = counted(json.wrong.len(), "wrong answer");
+        let wrong = counted(json.wrong.len(), "wrong result");
         let summary = format!("{}: {pairs}, {rows}, {wrong}", out.join("report.html").display());
         let sentences = sections.iter().flat_map(|section| {
             section.sentences.iter().map(|sentence| format!("  {}: {sentence}", section.name))
         });
         console::lines(std::iter::once(summary).chain(sentences).map(|line| shown(&line)))?;
         let Some(first) = json.wrong.first() else { return Ok(()) };
-        let what = format!("expected right answers, found {} wrong; the first: {first}", json.wrong.len());
+        let what = format!("expected right results, found {} wrong; the first: {first}", json.wrong.len());
         Err(Failure::invalid(&out.join("report.json"), what))
     }
 }

@@ -31,20 +31,20 @@ pub(super) const KIND: Kind<Motion> = Kind {
 
 const ABOUT: &str = "\
 Programs often test a motion by samples: they check poses along the motion until one touches. Samples miss contacts between \
-them, and find others late. cbvh certifies its answers for every moment between start and end. This page tells for each pair \
-of meshes what samples miss, how late they are, and how long they take compared with the certified answers.";
+them, and find others late. cbvh certifies its results for every moment between start and end. This page tells for each pair \
+of meshes what samples miss, how late they are, and how long they take compared with the certified queries.";
 
 const RIGHT: &str = "\
-No answer contradicts another: where a motion is certified free, no sample touches.";
+No result contradicts another: where a motion is certified free, no sample touches.";
 
 const METHODS: &str = "\
-<li>Samples are equally spaced poses with both ends, asked about with <code>Querier::collide</code> until one touches.</li>
-<li>Certified answers are those of <code>Querier::motion</code>, which finds the first contact, and of \
+<li>Samples are equally spaced poses with both ends, checked with <code>Querier::collide</code> until one touches.</li>
+<li>Certified results are those of <code>Querier::motion</code>, which finds the first contact, and of \
 <code>Querier::is_free</code>, which looks for any. Both may leave a motion undecided if the meshes come nearer than a \
 millionth of the smaller mesh's diagonal without touching.</li>
 <li>A certified contact is missed if all samples are free. A contact is late by the time between the end of the part that is \
 certified free and the contact found, as a fraction of the motion; only contacts that are not missed count.</li>
-<li>Times are those of single motions on one thread, with the poses of samples made as they are needed. All ways to ask take turns \
+<li>Times are those of single motions on one thread, with the poses of samples made as they are needed. All ways to check take turns \
 in rounds, as many as fit into 10 seconds per pair, but at least one; <code>report.csv</code> has their number. A median is \
 taken over the motions of a round and then over the rounds.</li>
 <li>The figures are of these motions on one machine on one day. Other motions need more samples, or fewer.</li>";

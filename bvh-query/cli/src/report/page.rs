@@ -88,13 +88,13 @@ fn opening(report: &Report, words: &Words) -> String {
         text += &format!("<p>{}</p>\n", words.right);
     } else {
         text += &format!(
-            "<div class=\"wrong\"><p><strong>{} wrong answers.</strong> Do not rely on any figure here before they \
+            "<div class=\"wrong\"><p><strong>{} wrong results.</strong> Do not rely on any figure here before they \
              are explained.</p>{}</div>\n",
             wrong.len(),
             list(wrong.into_iter().take(20))
         );
     }
-    let quick = "This was a quick run that asked little in two rounds. Do not quote its figures.";
+    let quick = "This was a quick run of few queries in two rounds. Do not quote its figures.";
     let unoptimised = "The program was built without optimisation, so its times mean nothing.";
     for (holds, warning) in [(report.settings["quick"] == true, quick), (origin.unoptimised, unoptimised)] {
         if holds {

@@ -1,4 +1,4 @@
-//! `cbvh robot`: asks a robot from a URDF file about configurations of its joints, and about edges between them.
+//! `cbvh robot`: checks a robot from a URDF file in configurations of its joints, and along edges between them.
 
 mod page;
 
@@ -21,7 +21,7 @@ Examples:
   cbvh robot panda.urdf --srdf panda.srdf configurations.txt
   cbvh robot panda.urdf --srdf panda.srdf --obstacle \"table.obj@1 0 0 0.5  0 1 0 0  0 0 1 -0.2\" configurations.txt --mode distance
   cbvh robot panda.urdf --srdf panda.srdf configurations.txt --mode near --margin 0.05 --json
-  cbvh robot panda.urdf --srdf panda.srdf --obstacle cell.cbvh edges.txt --edges --jobs 4 --json > answers.jsonl
+  cbvh robot panda.urdf --srdf panda.srdf --obstacle cell.cbvh edges.txt --edges --jobs 4 --json > results.jsonl
   cbvh robot arm.urdf --package-dir ros/src --joints \"0 0.4 -1.2 0\"
   cbvh robot panda.urdf --srdf panda.srdf --obstacle cell.cbvh edges.txt --edges --view robot.html
 
@@ -30,11 +30,11 @@ metres for those that slide. Fixed joints and joints that mimic others have none
 floating one seven (x, y, z, and a quaternion: qx, qy, qz, qw). With --edges, a line has two such configurations, and the joint values go \
 straight from the first, at time 0, to the second, at time 1. # starts a comment. Limits of joints are not checked.
 
-The question is about all pairs of bodies (links and obstacles) that can move against each other, but for those that the SRDF disables. \
-Neighbours across a moving joint are asked about, unless they are disabled. Meshes are surfaces: a body inside a mesh without \
+The query is about all pairs of bodies (links and obstacles) that can move against each other, but for those that the SRDF disables. \
+Neighbours across a moving joint are checked, unless they are disabled. Meshes are surfaces: a body inside a mesh without \
 touching it is free, unless --solid fills the obstacles. Boxes, cylinders, spheres and capsules of the URDF are solid.
 
-One answer is printed per line, in the order of FILE. collide: 1 if any two bodies touch, 0 if not. distance: the distance of the \
+One result is printed per line, in the order of FILE. collide: 1 if any two bodies touch, 0 if not. distance: the distance of the \
 nearest two bodies in metres (17 digits), 0 if they touch, inf if there are no pairs. near: how many pairs of bodies overlap or are at most \
 --margin apart, and the least signed distance of these, which is minus a depth where bodies overlap, or inf. --edges: free, hit FREE_UNTIL TOUCHING_AT, or near \
 FREE_UNTIL AT, as cbvh motion prints them, and as certain: no two bodies touch at any moment before FREE_UNTIL; at TOUCHING_AT \
@@ -51,7 +51,7 @@ An obstacle is a mesh file or a .cbvh file. POSE places it in the world: 12 numb
 x y z of the position, then x y z w of a unit quaternion. Without @POSE, it is in the world's frame. Its name is that of its file \
 without folders and extension, with #2, #3 and so on if the name is taken. --profile, --triangles and --round are about obstacles only.
 
---bench prints one object: what was asked, the times of the questions, positives (contact, or hits) and answers_xxh3, a hash of the answers, which is the \
+--bench prints one object: the query, the times, positives (contact, or hits) and answers_xxh3, a hash of the results, which is the \
 same for every --isa and --jobs. It is null if --budget cut the run short. Tests of nodes and triangles are not counted, and are null. \
 --out writes the lines, each with its nanoseconds.
 
@@ -68,7 +68,7 @@ pub(crate) struct RobotArguments {
     /// Configurations of the joints, or edges with --edges, one per line
     #[arg(required_unless_present_any = ["one", "view"], conflicts_with = "one")]
     file: Option<PathBuf>,
-    /// An SRDF file, whose disabled pairs are not asked about
+    /// An SRDF file, whose disabled pairs are not checked
     #[arg(long, value_name = "SRDF")]
     srdf: Option<PathBuf>,
     /// A folder that contains packages, for package:// paths of the URDF; may be given several times
@@ -83,10 +83,10 @@ pub(crate) struct RobotArguments {
     /// Obstacles are full: what is inside touches them. Their meshes must be closed
     #[arg(long, requires = "obstacle")]
     solid: bool,
-    /// Ask about edges: straight motions of all joint values between two configurations
+    /// Check edges: straight motions of all joint values between two configurations
     #[arg(long)]
     edges: bool,
-    /// The question
+    /// The query
     #[arg(long, value_enum, default_value = "collide")]
     mode: Mode,
     /// With --mode near: bodies that are at most this far apart are near, in metres
@@ -95,18 +95,18 @@ pub(crate) struct RobotArguments {
     /// With --edges: bodies that are at most this far apart count as a hit, in metres
     #[arg(long, value_name = "C", default_value = "0", value_parser = not_negative, allow_negative_numbers = true, requires = "edges")]
     clearance: f64,
-    /// With --edges: how far beyond the clearance the answer may be near, in metres [default: 1e-6 of the smaller shape's diagonal]
+    /// With --edges: how far beyond the clearance the result may be near, in metres [default: 1e-6 of the smaller shape's diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true, requires = "edges")]
     tolerance: Option<f64>,
     #[command(flatten)]
     run: RunArguments,
-    /// Write raw answers and times to this file
+    /// Write raw results and times to this file
     #[arg(long, value_name = "raw.txt")]
     out: Option<PathBuf>,
-    /// Print one JSON object about all lines, with their times, and no answers
+    /// Print one JSON object about all lines, with their times, and no results
     #[arg(long, conflicts_with = "json")]
     bench: bool,
-    /// Ask about one configuration (with --edges: one edge), given as a line of FILE, and print the answer for a person
+    /// Check one configuration (with --edges: one edge), given as a line of FILE, and print the result for a person
     #[arg(id = "one", long = "joints", value_name = "NUMBERS", allow_hyphen_values = true, conflicts_with_all = asking::OF_FILES)]
     joints: Option<String>,
     /// Write a page that shows the robot, with a slider for each joint value
@@ -227,7 +227,7 @@ fn read_robot(arguments: &RobotArguments) -> Result<Robot, Failure> {
     robot.warnings().iter().for_each(|warning| tell_warning(warning));
     if robot.joints().is_empty() && arguments.asks() {
         let what =
-            "expected a robot with joints that move, found none; cbvh scene asks about shapes without joints";
+            "expected a robot with joints that move, found none; cbvh scene queries shapes without joints";
         return Err(Failure::invalid(&arguments.urdf, what));
     }
     Ok(robot)

@@ -1,4 +1,4 @@
-//! `cbvh scene`: asks a scene of many placed meshes about frames of moving ones.
+//! `cbvh scene`: runs queries about a scene of many placed meshes, for frames of moving ones.
 
 pub(crate) mod file;
 mod record;
@@ -19,7 +19,7 @@ const HELP: &str = "\
 Examples:
   cbvh scene cell.scene frames.txt --mode collide
   cbvh scene cell.scene frames.txt --mode pairs --list
-  cbvh scene cell.scene frames.txt --mode within --within 0.05 --jobs 4 --json > answers.jsonl
+  cbvh scene cell.scene frames.txt --mode within --within 0.05 --jobs 4 --json > results.jsonl
   cbvh scene factory.cbvh --mode pairs --list
 
 SCENE is a file made by cbvh bake --scene, or a text file. FRAMES move all instances of a baked scene; without FRAMES they \
@@ -34,16 +34,16 @@ stand where the file says. A text file has one item per line; # starts a comment
   instance NAME SHAPE POSE    a shape in the world; POSE has 12 numbers, the rows of the 3 by 4 matrix [R | t], or 7: x y z \
 of the position, then x y z w of a unit quaternion
   moving NAME...              the instances that frames move, in the order of their poses
-  allow NAME NAME             two instances that may touch; this pair is never asked about
+  allow NAME NAME             two instances that may touch; this pair is never checked
   margin NAME R               an instance that reaches R farther on all sides
 
 Write names and files with spaces in quotes: \"left arm\".
 
-Each line of FRAMES has 12 numbers for each moving instance. The question is about all pairs in which at least one instance \
+Each line of FRAMES has 12 numbers for each moving instance. The query is about all pairs in which at least one instance \
 moves; in a baked scene, about all pairs whose groups meet. A text file in which nothing moves takes no FRAMES: it is one \
-frame, and the question is about all its pairs.
+frame, and the query is about all its pairs.
 
-One answer is printed per line, in the order of the frames: 0 or 1 (collide), the number of pairs (pairs, within, relation) \
+One result is printed per line, in the order of the frames: 0 or 1 (collide), the number of pairs (pairs, within, relation) \
 or the distance of the nearest pair (17 digits; inf if there are no pairs). relation finds the pairs that touch, and those \
 in which one instance is inside the other, wholly or in part. --list prints the pairs for a person; with --mode distance it \
 prints the distances of all pairs, the nearest first.
@@ -53,7 +53,7 @@ the names a and b (and relation, as cbvh query numbers it). With --mode distance
 distance, lower, upper, point_a and point_b in the world, object_a, triangle_a, object_b and triangle_b; the distance is \
 null if there are no pairs. With --list it also has others, the distances of the other pairs.
 
---bench prints one object: what was asked, the times of the frames, and answers_xxh3, a hash of the answers, which is the \
+--bench prints one object: the query, the times of the frames, and answers_xxh3, a hash of the results, which is the \
 same for every --isa and --jobs. It is null if --budget cut the run short. --out writes the lines, each with its \
 nanoseconds. They include moving the instances and, with --list, the distances of all pairs.";
 
@@ -65,7 +65,7 @@ pub(crate) struct SceneArguments {
     scene: PathBuf,
     /// The poses of the moving instances, one frame per line
     frames: Option<PathBuf>,
-    /// The question
+    /// The query
     #[arg(long, value_enum, default_value = "collide")]
     mode: Mode,
     /// With --mode within: the distance to compare with, in mesh units
@@ -73,13 +73,13 @@ pub(crate) struct SceneArguments {
     within: Option<f64>,
     #[command(flatten)]
     run: RunArguments,
-    /// Write raw answers and times to this file
+    /// Write raw results and times to this file
     #[arg(long, value_name = "raw.txt")]
     out: Option<PathBuf>,
     /// Print the pairs of each frame for a person, with their names
     #[arg(long)]
     list: bool,
-    /// Print one JSON object about all frames, with their times, and no answers
+    /// Print one JSON object about all frames, with their times, and no results
     #[arg(long, conflicts_with_all = ["list", "json"])]
     bench: bool,
 }

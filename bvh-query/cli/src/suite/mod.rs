@@ -1,4 +1,4 @@
-//! `cbvh suite`: answers the questions of the public suite, one line in, one line out.
+//! `cbvh suite`: runs the queries of the public suite, one line in, one line out.
 //!
 //! `spec/suite/PROTOCOL.md` defines the lines. [`message`] reads them, [`meshes`] keeps the meshes that were sent, and
 //! [`ask`] puts each question to bvh-query. A line that cannot be answered gets a refusal with its reason, and the command
@@ -28,7 +28,7 @@ Examples:
   python spec/suite/run.py --runner 'cbvh suite'
 
 spec/suite/PROTOCOL.md defines the lines that the command reads and writes. Meshes are baked in memory with the default \
-options, or with --effort quick in less time. Those of timed questions then have no topology, so that sides are refused. What cannot be answered, such as a question about a mesh that has a coordinate NaN, is refused with a reason.";
+options, or with --effort quick in less time. Those of timed queries then have no topology, so that sides are refused. What has no result, such as a query about a mesh that has a coordinate NaN, is refused with a reason.";
 
 /// What `suite` accepts.
 #[derive(Debug, Args)]
@@ -38,7 +38,7 @@ pub(crate) struct SuiteArguments {
     #[arg(long, value_name = "ISA", default_value = "auto")]
     isa: String,
 
-    /// Time spent on a better tree: quick or default. Answers are the same
+    /// Time spent on a better tree: quick or default. Results are the same
     #[arg(long, value_name = "EFFORT", default_value = "default", value_parser = bake::effort)]
     effort: Effort,
 }

@@ -26,7 +26,7 @@ Examples:
   cbvh view --scene factory.cbvh
 
 The page is one HTML file. It needs no network and no server: the files that it shows are in it, and so is cbvh itself, which \
-the page asks. Send it to somebody, and they see what you see.
+runs the queries. Send it to somebody, and they see what you see.
 
 One FILE is shown alone, and a file made by cbvh bake --scene as a scene. With --pose or --motion, a single FILE is both A and B. Two \
 FILEs are A and B, and are in one frame unless --pose or --motion places B. The numbers are those of cbvh query --pose and cbvh motion \
@@ -61,7 +61,7 @@ pub(crate) struct ViewArguments {
     /// With --motion: meshes that are at most this far apart count as a hit, in mesh units [default: 0]
     #[arg(long, value_name = "C", value_parser = not_negative, allow_negative_numbers = true, requires = "motion")]
     clearance: Option<f64>,
-    /// With --motion: how far beyond the clearance the answer may be near [default: 1e-6 of the smaller diagonal]
+    /// With --motion: how far beyond the clearance the result may be near [default: 1e-6 of the smaller diagonal]
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true, requires = "motion")]
     tolerance: Option<f64>,
     /// Show a scene file, or a .cbvh file made by cbvh bake --scene, and the frames of a file

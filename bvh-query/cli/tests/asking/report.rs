@@ -90,7 +90,7 @@ fn four_files_hold_the_same_figures_and_all_answers_are_right() {
     assert_eq!(pairs[1]["a"]["triangles"], 2 * 24 * 12);
     assert_eq!(pairs[1]["a"]["chosen_layout"], pairs[1]["b"]["chosen_layout"]);
     let said = String::from_utf8(ended.stdout).unwrap();
-    assert!(said.contains("0 wrong answers") && said.contains("Without options cbvh bake chooses"), "{said}");
+    assert!(said.contains("0 wrong results") && said.contains("Without options cbvh bake chooses"), "{said}");
 }
 
 /// Checks what holds for every row.

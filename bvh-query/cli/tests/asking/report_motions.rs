@@ -51,7 +51,7 @@ fn four_files_hold_the_same_figures_and_no_answer_contradicts_another() {
     assert_eq!([&tori["motions"], &tori["hits"], &tori["free"]], [2, 1, 1]);
     assert_eq!((&tori["undecided"], &json["settings"]["motions"]), (&0.into(), &10.into()));
     assert!(
-        said.contains("18 rows, 0 wrong answers")
+        said.contains("18 rows, 0 wrong results")
             && said.contains("tori: 2 motions: 1 certified hits, 1 free, 0 undecided"),
         "{said}"
     );

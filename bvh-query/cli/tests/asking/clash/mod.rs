@@ -136,7 +136,7 @@ fn each_class_is_found_in_a_folder() {
         text.contains(words) && text.contains("in mesh units") && text.contains("plate | sub/near"),
         "{text}"
     );
-    assert!(text.contains("copies of earlier parts in their places, not asked about others: 1\n"));
+    assert!(text.contains("copies of earlier parts in their places, not compared with others: 1\n"));
     let text = directory.cbvh("clash parts --limit 2").done().out;
     assert!(text.contains("and 3 more: --limit 0 lists all\n") && !text.contains("contained  "), "{text}");
     let text = directory
