@@ -200,7 +200,7 @@ class Runs(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             code, page = timed(folder)
             self.assertEqual(code, 0, page)
-            self.assertIn("no answers are wrong", page)
+            self.assertIn("no results are wrong", page)
             self.assertIn("\nside,one call,scan-10k,near,gaps,1,45,3,0,", (Path(folder) / "probes.csv").read_text(encoding="utf-8"))
             self.assertIn("### Is the point inside? (`side`)", page)
             self.assertIn("collide,scan-1k,touching,gaps,2,0,", (Path(folder) / "queries.csv").read_text(encoding="utf-8"))
@@ -255,7 +255,7 @@ class Reports(unittest.TestCase):
         self.assertIn("| ray | m | camera | 300 | x | 200 | 1.50 |\n\n", page)
         self.assertIn("One by one:\n\n| mesh | kind | cbvh | x | best other / cbvh |\n|---|---|---|---|---|\n| m | camera | 300 | 200 | 0.67 |\n", page)
         self.assertIn("| mesh | kind | cbvh | x | y | best other / cbvh |\n|---|---|---|---|---|---|\n| m | camera | 90 | 180 | 20 (2 wrong) | 2.00 |\n", page)
-        self.assertIn("By the proofs, 3 answers are wrong", page)
+        self.assertIn("By the proofs, 3 results are wrong", page)
         self.assertIn("ray,one call,m,camera,y,1,600,40,2,20.0,40.0,60.0\n", probed)
         self.assertIn("collide,p,1%,x,2,0,1.00,1.00,100.00\ncollide,p,1%,y,2,1,0.01,0.01,1.00\n", queries)
         self.assertIn("p,x,100,100,100,\n", builds)
