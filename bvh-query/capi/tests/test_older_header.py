@@ -30,7 +30,7 @@ class OlderHeader(unittest.TestCase):
     def test_additions_are_allowed(self):
         added = [
             ("cbvh_status cbvh_abi(uint32_t *abi);", "cbvh_status cbvh_abi(uint32_t *abi);\ncbvh_status cbvh_more(uint32_t *more);"),
-            ("    double weld;\n} cbvh_bake_options;", "    double weld;\n    double more;\n} cbvh_bake_options;"),
+            ("    cbvh_stop stop;\n} cbvh_bake_options;", "    cbvh_stop stop;\n    double more;\n} cbvh_bake_options;"),
             ("    CBVH_STOPPED = 12\n", "    CBVH_STOPPED = 12,\n    CBVH_MORE = 13\n"),
             ("/* The identity pose. */", "#define CBVH_MORE_POSES 7\ntypedef struct cbvh_more_rows { double x; } cbvh_more_rows;"),
             # Names of arguments are no part of the interface.
@@ -87,7 +87,7 @@ class OlderHeader(unittest.TestCase):
         self.breaks(
             ("    int32_t split_objects;\n", "    int32_t more;\n    int32_t split_objects;\n"),
             *(f"cbvh_bake_options.{field}: {place}" for field in
-              ("split_objects", "scene", "no_ids", "no_topology", "force", "solid", "allow_outside", "drop_nan", "round", "weld")),
+              ("split_objects", "scene", "no_ids", "no_topology", "force", "solid", "allow_outside", "drop_nan", "round", "weld", "stop")),
             "cbvh_bake_options.more: expected a new field behind the structure of the older header, found it within",
         )
 
