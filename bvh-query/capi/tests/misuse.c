@@ -285,7 +285,7 @@ static void bakes(void) {
     OPTION(scene, 1, "options.scene: expected nothing");
     OPTION(max_memory, 1, "options.max_memory: expected nothing");
     FAILS(cbvh_bake(CUBE_VERTICES, 8, CUBE_FACES, 12, &(cbvh_bake_options){.size = 8}, &made), CBVH_INVALID_ARGUMENT,
-          "options.size: expected 112");
+          "options.size: expected 120");
     const char *missing = "/no such folder/x.obj";
     FAILS(cbvh_bake_files(&missing, 1, "/no such folder/x.cbvh", NULL, NULL), CBVH_SYSTEM, "x.obj");
     FAILS(cbvh_mesh_open("/no such folder/x.cbvh", CBVH_READ, &made), CBVH_SYSTEM, "x.cbvh");
