@@ -85,7 +85,7 @@ pub extern "C" fn cbvh_stop_set(stop: StopHandle) -> i32 {
 pub extern "C" fn cbvh_stop_set_after(stop: StopHandle, seconds: f64) -> i32 {
     change(stop, |flag| {
         if seconds.is_nan() || seconds < 0.0 {
-            return Err(Failure::argument("seconds", "at least 0", seconds));
+            return Err(Failure::argument("seconds", "at least 0", format!("{seconds:?}")));
         }
         let time = Duration::try_from_secs_f64(seconds).map_or(NEVER, nanoseconds);
         flag.until.store(now().saturating_add(time), Ordering::Relaxed);
