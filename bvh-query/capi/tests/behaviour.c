@@ -1545,6 +1545,14 @@ static void files(const char *folder, const char *testdata) {
     CHECK(up_to_date == 0);
     OK(cbvh_bake_files(inputs, 1, output, &packed, &up_to_date));
     CHECK(up_to_date == 1);
+    /* A bake that is stopped leaves the output as it is. */
+    cbvh_bake_options stopped = {.size = sizeof stopped, .force = 1};
+    OK(cbvh_stop_new(&stopped.stop));
+    OK(cbvh_stop_set(stopped.stop));
+    FAILS(cbvh_bake_files(inputs, 1, output, &stopped, &up_to_date), CBVH_STOPPED, "found it stopped");
+    OK(cbvh_stop_free(stopped.stop));
+    OK(cbvh_bake_files(inputs, 1, output, &packed, &up_to_date));
+    CHECK(up_to_date == 1);
     bake_warnings(folder);
     uint64_t triangles[4];
     cbvh_mesh opened[4];

@@ -600,6 +600,9 @@ static void stops(const std::string &urdf) {
     stop.clear();
     CHECK(scene.collide());
     stop.set();
+    cbvh::BakeOptions options;
+    options.stop = stop.raw();
+    FAILS(cbvh::Mesh::bake({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, options), CBVH_STOPPED, "found it stopped");
     scene.set_stop(nullptr);
     robot.set_stop(nullptr);
     CHECK(scene.collide() && robot.collide(up) == touches);
