@@ -130,7 +130,7 @@ pub struct Options {
     pub radius: f64,
     /// Whether what is inside the objects touches them. All of them must be closed.
     pub solid: bool,
-    /// Whether the file states which objects are closed, with a triangle of each component. Questions about what is
+    /// Whether the file states which objects are closed, with a triangle of each component. Queries about what is
     /// inside a mesh need it. It takes less than 0.01 bytes per triangle, unless a mesh has many components or duplicates.
     pub topology: bool,
     /// What stops a bake that is under way. It changes no bytes, and [`Self::stamp`] leaves it out. See [`Self::stop`].

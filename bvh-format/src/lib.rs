@@ -1,7 +1,7 @@
 //! The `.cbvh` file format: bounding volume hierarchies of triangle meshes, in treelets of 32 to 256 bytes.
 //!
 //! This crate defines the bytes of a file: the place of each, how it is written and read, and the rules that it obeys.
-//! It builds no trees and answers no questions about them. Most applications need only its siblings: `bvh-bake` makes
+//! It builds no trees and answers no queries about them. Most applications need only its siblings: `bvh-bake` makes
 //! `.cbvh` files from meshes, and `bvh-query` maps them and answers collision and distance queries. Both build on this
 //! crate. Use it directly to inspect files, to check them, or to write another baker, viewer or query.
 //!

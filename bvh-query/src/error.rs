@@ -65,7 +65,7 @@ pub enum QueryError {
     /// The flag of [`crate::Querier::set_stop`] was set before there was an answer. Nothing is known of it.
     #[error("expected time for an answer, found the query stopped: its flag is set, or its time is over")]
     Stopped,
-    /// A number given with the question is invalid, such as a distance of NaN.
+    /// A number given with the query is invalid, such as a distance of NaN.
     #[error(transparent)]
     Number(#[from] NumberError),
     /// A file that [`crate::Files`] opens at first need is no longer what it was when its header was read.
@@ -79,9 +79,9 @@ pub enum QueryError {
     /// The file does not state which of its objects are closed.
     #[error("this file does not say which objects are closed; bake it again with topology")]
     NoTopology,
-    /// The question is about the inside of a shape, and this object of its file is not closed.
+    /// The query is about the inside of a shape, and this object of its file is not closed.
     #[error(
-        "expected closed objects, found object {object} open: {}; repair the mesh, or ask about its surface",
+        "expected closed objects, found object {object} open: {}; repair the mesh, or query its surface",
         explained(edges)
     )]
     NotClosed {

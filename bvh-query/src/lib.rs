@@ -27,12 +27,13 @@
 //! [`Scene`] runs these queries on many placed shapes, over all pairs that matter, except for contact regions,
 //! patches, self contacts, penetrations and separations, which a [`Querier`] computes pair by pair. [`Tracker`] computes
 //! whether two meshes touch, how far apart they are and whether they are within a distance in less time, for poses that
-//! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments. Batches,
-//! and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on rayon. The
-//! feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the feature
-//! `serde` serialises poses and answers, and reads them again, except for those about scenes, which name instances of one scene.
-//! Features whose names begin with `__` are not part of the public interface. Points, rays and segments are given in the frame of a mesh or, for a mesh that [`Shape::at`] places in
-//! the world, in the world. Each kind of operation has an error of its own, and all of them convert into [`Error`].
+//! follow a path. [`Batch`] uses all cores for many poses, and [`ProbeBatch`] for many points, rays and segments.
+//! Batches, and scenes on all cores, need the feature `parallel`, which is on by default and adds the dependency on
+//! rayon. The feature `mint` converts matrices and quaternions of other crates to a [`Pose`], and the feature `serde`
+//! serialises poses and answers, and reads them again, except for those about scenes, which name instances of one
+//! scene. Features whose names begin with `__` are not part of the public interface. Points, rays and segments are
+//! given in the frame of a mesh or, for a mesh that [`Shape::at`] places in the world, in the world. Each kind of
+//! operation has an error of its own, and all of them convert into [`Error`].
 //!
 //! A query about two meshes walks both trees together, and one about a point or a line walks one tree. Nodes and triangles
 //! are filtered in `f32`, 16 at a time, by AVX-512, AVX2, NEON, SIMD128 or portable code. What the filters cannot decide

@@ -1,6 +1,6 @@
 /* cbvh: exact collision and distance queries between rigid triangle meshes. The C interface, C99.
  *
- * A mesh is baked once, from arrays or files, into the bytes of a .cbvh file. Questions are about meshes in poses:
+ * A mesh is baked once, from arrays or files, into the bytes of a .cbvh file. Queries are about meshes in poses:
  *
  *     cbvh_mesh room, robot;
  *     cbvh_querier querier;
@@ -13,14 +13,14 @@
  * What holds for all functions:
  *
  * Errors. Every function except cbvh_last_message returns a cbvh_status. Any status except CBVH_OK leaves a message for
- * the thread, which names the argument, what was expected and what was found. Arguments are checked before any question
+ * the thread, which names the argument, what was expected and what was found. Arguments are checked before any query
  * is asked. After a failure, handles that a function should have made are 0, and answers have no particular values;
  * nothing is ever written beyond them. Nothing unwinds out of a function. No argument makes a function crash if two
  * conditions hold: pointers that are neither null nor misaligned lead to as many elements as stated, and text ends with
  * a zero byte. If memory for arrays of the caller or for a list of contacts runs out, the status is CBVH_LIMIT. If it
  * runs out elsewhere, the process ends. Functions need 128 KiB of stack.
  *
- * Poses are "body to world". In questions about two meshes, the world is the frame of mesh A: a point x of mesh B is at
+ * Poses are "body to world". In queries about two meshes, the world is the frame of mesh A: a point x of mesh B is at
  * R x + t in A's frame. Points are columns; a pose is the rows of the 3 by 4 matrix [R | t]. R is a rotation to within
  * 2^-20. Lengths are in the unit of the meshes.
  *
@@ -31,17 +31,17 @@
  *
  * Threads. Functions may be called on any thread. Many threads may use a mesh, a path, a scene or a robot at the same
  * time. Only one thread at a time may use a querier or a tracker; a second one gets CBVH_BUSY. Make one querier for each
- * thread. A question is about a scene or a robot as it is when the question begins. Other threads may change it
- * meanwhile, and nobody waits for a question. A mesh, a path, a scene or a robot may be freed while other threads use
- * it: it lives until their questions end. A flag (cbvh_stop) may be set, cleared and freed on any thread at any time.
- * cbvh_querier_set_parallel, cbvh_scene_set_parallel and cbvh_robot_set_parallel let one question use all cores. The
+ * thread. A query is about a scene or a robot as it is when the query begins. Other threads may change it
+ * meanwhile, and nobody waits for a query. A mesh, a path, a scene or a robot may be freed while other threads use
+ * it: it lives until their queries end. A flag (cbvh_stop) may be set, cleared and freed on any thread at any time.
+ * cbvh_querier_set_parallel, cbvh_scene_set_parallel and cbvh_robot_set_parallel let one query use all cores. The
  * number of threads is that of the environment variable RAYON_NUM_THREADS or, without it, of the cores.
  *
- * Answers have the same bits on every CPU, on any number of threads and in any order of questions, and are those of the
+ * Answers have the same bits on every CPU, on any number of threads and in any order of queries, and are those of the
  * command cbvh and of the Rust library. They do not depend on how the calling thread rounds (fesetround), whether it
  * flushes subnormal numbers (-ffast-math) and which exceptions trap (feenableexcept): functions change this state if
  * they have to, and restore it. Functions of the caller run in the floating-point state of the thread that asked the
- * question, except for long double on x86-64 on threads of the library.
+ * query, except for long double on x86-64 on threads of the library.
  *
  * Lists. A function with a list of answers takes a buffer, the number of elements for which it has room, and a count.
  * The count always gets the number of all answers. If there are more answers than room, those that fit are written, and
@@ -173,7 +173,7 @@ enum {
 };
 
 /* Opens a .cbvh file. CBVH_SYSTEM if the system refuses it or it is not a regular file, CBVH_DAMAGED if it is not a
- * .cbvh file. Only the header and the table of objects are checked. If other parts are damaged, the question that needs
+ * .cbvh file. Only the header and the table of objects are checked. If other parts are damaged, the query that needs
  * them fails. */
 cbvh_status cbvh_mesh_open(const char *path, cbvh_open_mode mode, cbvh_mesh *mesh);
 /* Opens the bytes of a .cbvh file, which are copied. */
@@ -189,7 +189,7 @@ cbvh_status cbvh_mesh_borrow_bytes(const void *bytes, size_t size, void (*releas
 /* Makes another handle of the same mesh, which must also be freed. Nothing is copied. */
 cbvh_status cbvh_mesh_clone(cbvh_mesh mesh, cbvh_mesh *other);
 /* Frees a handle. Scenes and clones keep the meshes that they use. A querier keeps the last eight meshes of its
- * questions until it is freed, or until the next question about any open mesh. */
+ * queries until it is freed, or until the next query about any open mesh. */
 cbvh_status cbvh_mesh_free(cbvh_mesh mesh);
 
 /* Makes a mesh of one object in the file of a mesh, without a radius and not solid. CBVH_NOT_FOUND if the file has no
@@ -411,7 +411,7 @@ enum {
 };
 
 /* Makes a querier. CBVH_INVALID_ARGUMENT for a backend that the CPU lacks. Until it is freed, it keeps the memory of
- * its largest question: 100 bytes for each pose and each probe. */
+ * its largest query: 100 bytes for each pose and each probe. */
 cbvh_status cbvh_querier_new(cbvh_backend backend, cbvh_querier *querier);
 /* Frees a querier. CBVH_BUSY while it is in use. */
 cbvh_status cbvh_querier_free(cbvh_querier querier);
@@ -421,11 +421,11 @@ cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
 /* Limits the question about each pose, path or probe to this many visits, of some 100 ns each. A question that needs
  * more ends with CBVH_LIMIT. A visit is a pair of objects or of nodes; a node, for a probe; a contact, and each of its
  * duplicates; a component and an object, for a relation; or an interval of a motion. Without a budget, only the sizes
- * of the files limit a question. */
+ * of the files limit a query. */
 cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
 
 /* Makes a flag that is not set. Any number of queriers, scenes and robots may have it. While it is set, each of their
- * questions ends with CBVH_STOPPED: one that is under way within a millisecond or so, and a new one at once. Bakes may have it, too
+ * queries ends with CBVH_STOPPED: one that is under way within a millisecond or so, and a new one at once. Bakes may have it, too
  * (cbvh_bake_options). A flag that is not set affects no answer and no file. */
 cbvh_status cbvh_stop_new(cbvh_stop *stop);
 /* Sets a flag, on any thread, but not in a signal handler. */
@@ -460,8 +460,8 @@ cbvh_status cbvh_querier_stats(cbvh_querier querier, cbvh_stats *stats);
 /* --------------------------------------------------------------------------------------- questions about two meshes
  *
  * Each function takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces unless they are
- * solid. Touching is contact, exactly. The functions fail with CBVH_DAMAGED if a page that a question touches is
- * damaged, and with CBVH_LIMIT if the budget of the querier does not suffice. A question about small or separated
+ * solid. Touching is contact, exactly. The functions fail with CBVH_DAMAGED if a page that a query touches is
+ * damaged, and with CBVH_LIMIT if the budget of the querier does not suffice. A query about small or separated
  * meshes takes about a microsecond; a call adds some 0.1. */
 
 /* Answers whether the meshes touch. */
@@ -806,11 +806,11 @@ typedef struct cbvh_clash_options {
 } cbvh_clash_options;
 
 /* Answers how two parts lie: apart, near, touching, overlapping, one in the other, or twice in one place. Flush faces overlap
- * or come apart by roundings in nearly all poses, so that a tolerance is part of the question: parts that are no farther
+ * or come apart by roundings in nearly all poses, so that a tolerance is part of the query: parts that are no farther
  * apart and no deeper in each other (cbvh_penetrations) are touching. Where a part fits another one without a gap, like a peg in its
  * hole, the depth is mostly undecided. One core is used. CBVH_INVALID_ARGUMENT for a file that was baked without
- * topology, where the question is about the inside; CBVH_LIMIT if the budget does not suffice for the rest of the
- * question. */
+ * topology, where the query is about the inside; CBVH_LIMIT if the budget does not suffice for the rest of the
+ * query. */
 cbvh_status cbvh_clashes(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, const cbvh_pose *poses, size_t count,
                          const cbvh_clash_options *options, cbvh_clash *answers);
 
@@ -929,13 +929,13 @@ typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
  * Compare it with a point that moves on a straight line, at a constant speed, from its place at t0 to its place at t1.
  * The sagitta is the greatest distance between the two during [t0, t1], which is at most an eighth of the greatest
  * acceleration times the square of the time. The bound must hold with all rounding; answers are only as certain as it
- * is. It may be infinite; NaN and negative numbers end the question with CBVH_CALLBACK_FAILED. */
+ * is. It may be infinite; NaN and negative numbers end the query with CBVH_CALLBACK_FAILED. */
 typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, double t1);
 /* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on
  * several threads at the same time if the querier or scene is parallel. They must not leave by an exception or longjmp.
- * They may call this library, but with the querier in use they get CBVH_BUSY. A question that they ask on a
+ * They may call this library, but with the querier in use they get CBVH_BUSY. A query that they run on a
  * thread of the library uses that thread only. `release` is called with `user` when the path is no longer used: once,
- * on any thread, when the handle is freed and questions about it have ended. It may be NULL. It must not throw an
+ * on any thread, when the handle is freed and queries about it have ended. It may be NULL. It must not throw an
  * exception and must not call this library. After a failure it is not called. */
 cbvh_status cbvh_path_from_functions(cbvh_pose_function pose, cbvh_sagitta_function sagitta,
                                      void (*release)(void *user), void *user, cbvh_path *path);
@@ -1007,7 +1007,7 @@ cbvh_status cbvh_edges_are_free(cbvh_querier querier, cbvh_mesh a, cbvh_mesh b, 
 
 /* ---------------------------------------------------------------------------------------------------------- probes
  *
- * Questions about one mesh and many points, rays or segments. `pose` is the pose of the mesh in the frame of the
+ * Queries about one mesh and many points, rays or segments. `pose` is the pose of the mesh in the frame of the
  * probes; NULL for the mesh's own frame. Points are 3 numbers each. */
 
 /* On which side of a mesh a point is. The command prints the same numbers. */
@@ -1117,10 +1117,10 @@ cbvh_status cbvh_visible(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *
 
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
- * Many placed meshes, and questions over all pairs that may meet. In a pair, A is the instance in the lower place, and
- * answers are in A's frame. Threads may ask about a scene while others change it: each question is about the scene as it
- * is when the question begins. The first change during a question copies the tables of the scene (2 us for 60 instances,
- * 0.3 ms for 10,000), and no mesh. A question may see one of two calls that change the scene and not the other: clone
+ * Many placed meshes, and queries over all pairs that may meet. In a pair, A is the instance in the lower place, and
+ * answers are in A's frame. Threads may ask about a scene while others change it: each query is about the scene as it
+ * is when the query begins. The first change during a query copies the tables of the scene (2 us for 60 instances,
+ * 0.3 ms for 10,000), and no mesh. A query may see one of two calls that change the scene and not the other: clone
  * the scene, which takes a microsecond, to change or to ask a copy that nobody else has. */
 
 /* Makes an empty scene. */
@@ -1137,7 +1137,7 @@ cbvh_status cbvh_scene_free(cbvh_scene scene);
 /* Lets questions use all cores (1) or one (0, the default). */
 cbvh_status cbvh_scene_set_parallel(cbvh_scene scene, int32_t parallel);
 /* Lets the scene reuse earlier results about each pair (1) or not (0, the default). This is faster if instances move
- * little between questions. */
+ * little between queries. */
 cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
 /* Limits each question to this many visits over all its pairs, and each probe over all instances. Visits are those of
  * cbvh_querier_set_budget, each comparison of a box with up to sixteen others in the search for near pairs, and each pair
@@ -1328,7 +1328,7 @@ cbvh_status cbvh_scene_visible(cbvh_scene scene, const cbvh_segment *segments, s
 /* ---------------------------------------------------------------------------------------------------------- robots
  *
  * A robot from a URDF file, obstacles and attached objects, asked about with the values of joints. A body is a link, an
- * obstacle or an attached object. Questions are about all pairs of bodies that can move against each other, except those
+ * obstacle or an attached object. Queries are about all pairs of bodies that can move against each other, except those
  * whose contact is allowed, by cbvh_robot_set_allowed or by the SRDF file. Links that only fixed joints connect are never
  * asked about with each other, and neither are obstacles. The frame of the root link is the world, unless the base moves.
  * Lengths are in metres, the unit of URDF files, and angles in radians.
@@ -1451,7 +1451,7 @@ cbvh_status cbvh_robot_find(cbvh_robot robot, const char *name, cbvh_body *body)
 /* Writes the name of a body. CBVH_NOT_FOUND if there is none of the number, or if it was removed. */
 cbvh_status cbvh_robot_body_name(cbvh_robot robot, cbvh_body body, char *buffer, size_t capacity, size_t *length);
 /* Makes a handle of a shape of a body, to be freed, and writes its pose in the frame of its link or, for an obstacle, in
- * the world. The margin of the body is a part of its radius. This is for questions that robots do not answer, such as
+ * the world. The margin of the body is a part of its radius. This is for queries that robots do not answer, such as
  * cbvh_patches. CBVH_NOT_FOUND if there are no more shapes than `number`. */
 cbvh_status cbvh_robot_shape(cbvh_robot robot, cbvh_body body, size_t number, cbvh_mesh *mesh, cbvh_pose *pose);
 /* Lists the pairs that are asked about. */
@@ -1473,7 +1473,7 @@ cbvh_status cbvh_robot_remove(cbvh_robot robot, const char *name);
 /* Moves an obstacle, or an attached object in the frame of its link. CBVH_NOT_FOUND for a link. */
 cbvh_status cbvh_robot_set_pose(cbvh_robot robot, const char *name, const cbvh_pose *pose);
 /* Gives a body, a link, an obstacle or an attached object, a margin of at least 0, which is added to the radii of its
- * shapes in every question. It is 0 at first, and that of this body alone: what is attached to a link does not get the
+ * shapes in every query. It is 0 at first, and that of this body alone: what is attached to a link does not get the
  * link's. */
 cbvh_status cbvh_robot_set_margin(cbvh_robot robot, const char *name, double margin);
 /* Makes a body a solid, also a link: what is inside touches it from now on. CBVH_INVALID_ARGUMENT if a mesh of the body is
@@ -1558,9 +1558,9 @@ cbvh_status cbvh_robot_near_pairs(cbvh_robot robot, const double *joints, size_t
                                   const cbvh_penetration_options *options, size_t *counts, cbvh_robot_near_pair *pairs,
                                   double *gradients, size_t capacity, size_t *pair_count);
 /* Lists the bodies that are inside others without touching them, each as `a` with the body around it as `b`, configuration
- * after configuration. Other questions do not find them, because a mesh is its surface. A body counts if a connected part
+ * after configuration. Other queries do not find them, because a mesh is its surface. A body counts if a connected part
  * of it is inside a mesh of the other one. A mesh that is not closed has nothing inside. CBVH_INVALID_ARGUMENT if a file in
- * question was baked without topology. */
+ * query was baked without topology. */
 cbvh_status cbvh_robot_pairs_inside(cbvh_robot robot, const double *joints, size_t joint_count, size_t count,
                                     size_t *counts, cbvh_body_pair *pairs, size_t capacity, size_t *pair_count);
 

@@ -1,8 +1,8 @@
 // cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. This header wraps cbvh.h,
-// which documents the questions: shapes, units, costs and threads.
+// which documents the queries: shapes, units, costs and threads.
 //
 // Meshes and paths may be shared by threads; make a Querier for each thread. A Scene and a Robot may be asked while others
-// change them. Objects that were moved from hold no handle, and questions about them throw an Error of CBVH_INVALID_HANDLE.
+// change them. Objects that were moved from hold no handle, and queries about them throw an Error of CBVH_INVALID_HANDLE.
 #ifndef CBVH_HPP
 #define CBVH_HPP
 
@@ -103,7 +103,7 @@ using Instance = cbvh_instance;
 using Body = cbvh_body;
 using Stats = cbvh_stats;
 
-/// A rigid placement, body to world: see cbvh_pose. Questions check that it is rigid.
+/// A rigid placement, body to world: see cbvh_pose. Queries check that it is rigid.
 struct Pose : cbvh_pose {
     /// The identity.
     Pose() : cbvh_pose CBVH_IDENTITY {}
@@ -143,7 +143,7 @@ struct Pose : cbvh_pose {
         check(cbvh_pose_from_quaternion(quaternion.data(), translation.data(), &pose));
         return pose;
     }
-    /// Throws unless it is rigid, as questions do: see cbvh_pose_check.
+    /// Throws unless it is rigid, as queries do: see cbvh_pose_check.
     void check_rigid() const { check(cbvh_pose_check(this)); }
     /// The rigid pose nearest to this one, which is off by at most 2^-6.
     Pose nearest() const { return made([&](cbvh_pose *pose) { return cbvh_pose_nearest(this, pose); }); }
@@ -411,7 +411,7 @@ template <class Ask> std::vector<std::string> texts(Ask ask) {
     }
 }
 
-/// Divides a list into one for each question.
+/// Divides a list into one for each query.
 template <class Element>
 std::vector<std::vector<Element>> divided(const std::vector<Element> &all, const std::vector<std::size_t> &counts) {
     std::vector<std::vector<Element>> lists;
@@ -425,7 +425,7 @@ std::vector<std::vector<Element>> divided(const std::vector<Element> &all, const
     return lists;
 }
 
-/// Lists of many questions.
+/// Lists of many queries.
 template <class Element, class Ask>
 std::vector<std::vector<Element>> lists(Room &room, std::size_t questions, Ask ask) {
     std::vector<std::size_t> counts(questions);
@@ -690,8 +690,8 @@ public:
     }
     /// A path of your own: an object with `Pose pose(double t) const` and
     /// `double sagitta(double radius, double t0, double t1) const`, which cbvh_sagitta_function explains. The object is
-    /// copied, and the copy lives until the last question about the path has ended. If either function throws, the
-    /// question throws an Error of CBVH_CALLBACK_FAILED with the text of the exception.
+    /// copied, and the copy lives until the last query about the path has ended. If either function throws, the
+    /// query throws an Error of CBVH_CALLBACK_FAILED with the text of the exception.
     template <class Own> static Path of(Own own) {
         auto kept = std::make_unique<Own>(std::move(own));
         Path path = made([&](cbvh_path *raw) {
@@ -739,7 +739,7 @@ private:
         }
     }
     template <class Own> static void release(void *user) { delete static_cast<Own *>(user); }
-    /// Gives the text of the exception that is being handled to the question.
+    /// Gives the text of the exception that is being handled to the query.
     static void tell() noexcept {
         try {
             throw;
@@ -752,7 +752,7 @@ private:
     detail::Handle<cbvh_path, cbvh_path_free> handle_;
 };
 
-/// A flag that stops the questions of those that have it, and bakes (BakeOptions): see cbvh_stop_new. Any thread may set and clear it.
+/// A flag that stops the queries of those that have it, and bakes (BakeOptions): see cbvh_stop_new. Any thread may set and clear it.
 class Stop {
 public:
     Stop() {
@@ -773,7 +773,7 @@ private:
     detail::Handle<cbvh_stop, cbvh_stop_free> handle_;
 };
 
-/// Answers questions about meshes. Make one for each thread. If a list of contacts or hits is longer than 64 and than
+/// Answers queries about meshes. Make one for each thread. If a list of contacts or hits is longer than 64 and than
 /// the last list, the library asks for it twice, because the first time only counts its elements.
 class Querier {
 public:
@@ -783,10 +783,10 @@ public:
         handle_ = Owned(querier);
     }
     cbvh_querier raw() const noexcept { return handle_.raw(); }
-    /// Lets questions about many poses, paths or probes use all cores.
+    /// Lets queries about many poses, paths or probes use all cores.
     void set_parallel(bool parallel) { check(cbvh_querier_set_parallel(raw(), parallel)); }
     void set_budget(std::uint64_t visits) { check(cbvh_querier_set_budget(raw(), visits)); }
-    /// While the flag is set, questions throw an Error of CBVH_STOPPED. The querier keeps the flag; nullptr removes it.
+    /// While the flag is set, queries throw an Error of CBVH_STOPPED. The querier keeps the flag; nullptr removes it.
     void set_stop(const Stop &stop) { check(cbvh_querier_set_stop(raw(), stop.raw())); }
     void set_stop(std::nullptr_t) { check(cbvh_querier_set_stop(raw(), cbvh_stop{0})); }
     Stats stats() const {
@@ -1232,8 +1232,8 @@ private:
     Owned handle_;
 };
 
-/// Many placed meshes. Threads may ask while others change it: each question is about the scene as it is when the
-/// question begins. Copies share the meshes. If a list of pairs, contacts or hits is longer than 64 and than the last
+/// Many placed meshes. Threads may ask while others change it: each query is about the scene as it is when the
+/// query begins. Copies share the meshes. If a list of pairs, contacts or hits is longer than 64 and than the last
 /// list, the library asks for it twice, because the first time only counts its elements.
 class Scene {
 public:
@@ -1311,7 +1311,7 @@ public:
         check(cbvh_scene_set_groups(raw(), instance, member, meets));
     }
     void set_allowed(Instance a, Instance b, bool allowed) { check(cbvh_scene_set_allowed(raw(), a, b, allowed)); }
-    /// Adds a margin to the radius of an instance's mesh in every question.
+    /// Adds a margin to the radius of an instance's mesh in every query.
     void set_margin(Instance instance, double margin) { check(cbvh_scene_set_margin(raw(), instance, margin)); }
     /// Gives a pair a margin besides those of both.
     void set_pair_margin(Instance a, Instance b, double margin) {
@@ -1430,7 +1430,7 @@ public:
             });
     }
 
-    /// An instance, and the path in the world that it moves along, which must be there when the question is asked.
+    /// An instance, and the path in the world that it moves along, which must be there when the query runs.
     struct Way {
         Way(Instance moved, const Path &along) : instance(moved), path(along.raw()) {}
         /// This path would be gone by then: give it a name.
@@ -1563,7 +1563,7 @@ struct RobotOptions {
 };
 
 /// A robot among obstacles, asked about with the values of its joints, which are in the order of joints(). Threads may ask
-/// while others change it: each question is about the robot as it is when the question begins. Copies share the meshes.
+/// while others change it: each query is about the robot as it is when the query begins. Copies share the meshes.
 class Robot {
 public:
     using Joints = std::vector<double>;
@@ -1961,7 +1961,7 @@ private:
         });
     }
     void check_body(Body body) const { static_cast<void>(name(body)); }
-    /// Asks a question whose answer is pairs, about one configuration or many.
+    /// Runs a query whose answer is pairs, about one configuration or many.
     using PairsQuestion = decltype(cbvh_robot_pairs_in_contact);
     std::vector<cbvh_body_pair> pairs_of(PairsQuestion *ask, const Joints &joints) const {
         return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {

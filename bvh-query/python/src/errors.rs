@@ -14,7 +14,7 @@ create_exception!(
     cbvh,
     StoppedError,
     PyRuntimeError,
-    "A question was stopped before it had an answer, or a bake before it was done: see Stop."
+    "A query was stopped before it had an answer, or a bake before it was done: see Stop."
 );
 
 /// The exception of a file that cannot be opened. An error of the system keeps its class, such as `FileNotFoundError`.
@@ -50,7 +50,7 @@ pub(crate) fn question_error(error: &QueryError, message: String) -> PyErr {
         QueryError::Damaged(_) => FormatError::new_err(message),
         QueryError::File { .. } => PyOSError::new_err(message),
         QueryError::Stopped => {
-            StoppedError::new_err("expected time for an answer, found the question stopped")
+            StoppedError::new_err("expected time for an answer, found the query stopped")
         }
         _ => PyValueError::new_err(message),
     }

@@ -152,7 +152,7 @@ impl Nested {
     fn new() -> PyResult<Self> {
         let depth = NESTED.get();
         if depth >= MOST_NESTED {
-            let found = "path: expected questions in paths that questions ask at most 64 deep, found more";
+            let found = "path: expected queries in paths that queries call at most 64 deep, found more";
             return Err(PyRecursionError::new_err(found));
         }
         NESTED.set(depth + 1);

@@ -105,7 +105,7 @@ class Stopping(unittest.TestCase):
                     stop.set()
                     with stop:
                         self.assertTrue(stop.is_set())
-                        with self.assertRaisesRegex(StoppedError, "found the question stopped"):
+                        with self.assertRaisesRegex(StoppedError, "found the query stopped"):
                             question()
                         stop.clear()
                         self.assertEqual(repr(question()), expected)

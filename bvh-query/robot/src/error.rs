@@ -151,7 +151,7 @@ pub enum RobotError {
     /// A number or a shape was refused.
     #[error(transparent)]
     Query(#[from] QueryError),
-    /// The question about two bodies has no answer.
+    /// The query about two bodies has no answer.
     #[error("{a} and {b}: {source}")]
     Pair {
         /// The body that comes first.

@@ -4,7 +4,7 @@
 //! URDF (urdf) ──> kinematic tree (model) ─┐
 //!      meshes and primitives (shapes) ────┼──> bodies, and pairs that are asked about (robot)
 //! SRDF (srdf) ──> allowed pairs, groups ──┘        │
-//!                                                  ├──> questions about configurations (questions, asker, rod)
+//!                                                  ├──> queries about configurations (questions, asker, rod)
 //!                                                  ├──> pairs that are near, with derivatives (near_pairs)
 //!                                                  ├──> motions, certain at every moment (motions, pair_path, edge, turns),
 //!                                                  │      most of them by balls (screening, screen, cover, moments, states,

@@ -42,7 +42,7 @@ impl Robot {
     /// Returns whether any two bodies touch. A body that is inside a mesh without touching it does not: see
     /// [`Robot::pairs_inside`].
     ///
-    /// Cost: the poses of all links, a comparison of balls for each pair, and a question about contact for pairs whose balls
+    /// Cost: the poses of all links, a comparison of balls for each pair, and a query about contact for pairs whose balls
     /// meet, until one touches.
     ///
     /// ```
@@ -58,7 +58,7 @@ impl Robot {
     ///
     /// # Errors
     /// [`RobotError::Count`] and [`RobotError::Value`] for invalid joint values, [`RobotError::Pose`] if a link is too far away,
-    /// and [`RobotError::Pair`] if a question has no answer.
+    /// and [`RobotError::Pair`] if a query has no answer.
     pub fn collide(&mut self, joints: &[f64]) -> Result<bool, RobotError> {
         self.refresh();
         self.asker.collide(&self.setting, joints)
@@ -94,7 +94,7 @@ impl Robot {
     ///
     /// A body counts if a connected part of it is inside a shape of the other one. A shape that is not closed has nothing inside.
     ///
-    /// Cost: that of [`Robot::pairs_in_contact`], and a question about contact for pairs whose boxes meet.
+    /// Cost: that of [`Robot::pairs_in_contact`], and a query about contact for pairs whose boxes meet.
     ///
     /// ```
     /// # let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/robot/robot.urdf");

@@ -160,13 +160,13 @@ impl Robot {
         self.clone()
     }
 
-    /// Returns the backend that answers questions: the one that `CBVH_ISA` names or the fastest one of this CPU, unless
+    /// Returns the backend that answers queries: the one that `CBVH_ISA` names or the fastest one of this CPU, unless
     /// [`Robot::set_backend`] has set another one.
     pub fn backend(&self) -> Backend {
         self.asker.querier.backend()
     }
 
-    /// Sets the backend that answers questions from now on. Answers do not depend on it. The portable backend replaces one that the
+    /// Sets the backend that answers queries from now on. Answers do not depend on it. The portable backend replaces one that the
     /// CPU lacks. A clone has the backend of the original.
     pub fn set_backend(&mut self, backend: Backend) {
         let stop = self.asker.stop().cloned();
@@ -195,7 +195,7 @@ impl Robot {
     }
 
     /// Returns the lower and the upper limit of each joint value, infinite where there is none. A lower limit above the upper one is none,
-    /// with a warning. No question checks them.
+    /// with a warning. No query checks them.
     pub fn limits(&self) -> &[[f64; 2]] {
         &self.setting.model.limits
     }
@@ -390,7 +390,7 @@ impl Robot {
         Ok(())
     }
 
-    /// Lets two bodies touch: questions are no longer about them.
+    /// Lets two bodies touch: queries are no longer about them.
     ///
     /// # Errors
     /// [`RobotError::Unknown`].
@@ -429,7 +429,7 @@ impl Robot {
     }
 
     /// Returns the shapes of the body with a number, each with its pose: in the frame of its link or, for an obstacle, in the world. The
-    /// margin of the body is a part of their radii. Use them for questions that robots do not answer, such as contact regions.
+    /// margin of the body is a part of their radii. Use them for queries that robots do not answer, such as contact regions.
     ///
     /// # Errors
     /// [`RobotError::Pose`] if a shape is too far away.

@@ -18,7 +18,7 @@ pub struct RobotTree {
     pub joints: Vec<TreeJoint>,
     /// The shapes of links, in the order of [`Robot::links`], then those of other bodies.
     pub shapes: Vec<TreeShape>,
-    /// The pairs of shapes that questions are about, by their places in `shapes`.
+    /// The pairs of shapes that queries are about, by their places in `shapes`.
     pub pairs: Vec<[usize; 2]>,
 }
 

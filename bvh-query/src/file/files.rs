@@ -13,9 +13,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Files for scenes that have more files than should be open at once. Each file is opened when one of its instances is
 /// first near another instance, and the number of files that stay open is limited. Cloning it copies a pointer.
 ///
-/// [`Files::shape`] reads the header and the object table of a file and closes it. A question that needs the file opens
+/// [`Files::shape`] reads the header and the object table of a file and closes it. A query that needs the file opens
 /// it again, and fails if it is no longer the same. When too many files are open, the least recently used one is
-/// closed. Files in use are not closed, so while a question runs, up to two more files per thread may be open.
+/// closed. Files in use are not closed, so while a query runs, up to two more files per thread may be open.
 ///
 /// ```no_run
 /// use bvh_query::{Files, Pose, Scene};
@@ -55,7 +55,7 @@ struct Known {
     last_use: AtomicU64,
 }
 
-/// A shape in a scene. Either its file is open as long as the shape lives, or [`Files`] opens it only while a question
+/// A shape in a scene. Either its file is open as long as the shape lives, or [`Files`] opens it only while a query
 /// needs it. Every shape whose file is open converts into one.
 ///
 /// ```

@@ -86,7 +86,7 @@ impl Files {
     ///
     /// # Safety
     /// The same as for [`Bvh::map`], for each file given to [`Files::shape`], as long as a shape of it lives. A file
-    /// may change while it is closed: the next question that needs it then fails.
+    /// may change while it is closed: the next query that needs it then fails.
     pub unsafe fn mapped(most: usize) -> Self {
         // SAFETY: the caller vouches for each file that is opened in this way.
         Self::opened_by(most, |path| unsafe { Bvh::map(path) })

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 /// A [`Shape`] that keeps its file open. Use it for one object that outlives the code that opened its file; for all
 /// objects of a file, a [`Bvh`] is enough. Cloning it copies a pointer. A reference to it converts into a shape, so
-/// every question takes it.
+/// every query takes it.
 ///
 /// ```
 /// use bvh_query::{Bvh, OwnedShape, Pose, Querier};
@@ -39,7 +39,7 @@ impl OwnedShape {
         Some(Self { bvh, selection })
     }
 
-    /// Returns the shape in the form that questions take.
+    /// Returns the shape in the form that queries take.
     pub fn shape(&self) -> Shape<'_> {
         self.selection.in_file(&self.bvh)
     }

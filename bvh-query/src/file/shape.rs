@@ -23,7 +23,7 @@ impl Bvh {
     }
 }
 
-/// One side of a question, borrowed from its file: one object, or all objects as one. A `&Bvh` converts into the shape
+/// One side of a query, borrowed from its file: one object, or all objects as one. A `&Bvh` converts into the shape
 /// of all its objects.
 ///
 /// ```
@@ -46,7 +46,7 @@ impl Bvh {
 /// the cores less the sum, at least 0. Each addition is rounded to nearest, and the comparison with the sum is exact.
 ///
 /// # Solid shapes
-/// Questions are about surfaces. For a solid shape, what is inside counts as well: a shape of which any part is inside a solid
+/// Queries are about surfaces. For a solid shape, what is inside counts as well: a shape of which any part is inside a solid
 /// one touches it, and their distance is 0. [`Querier::relation`](crate::Querier::relation) and
 /// [`Querier::side`](crate::Querier::side) know insides anyway.
 #[derive(Clone, Copy, Debug)]

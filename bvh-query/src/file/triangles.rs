@@ -11,7 +11,7 @@ impl Shape<'_> {
     /// that was left out has a number of its own, and the corners of the triangle that is stored for it. In a file
     /// without ids, triangles are numbered in the order of each object.
     ///
-    /// Cost: reading the shape once, and checking the pages that no question has touched.
+    /// Cost: reading the shape once, and checking the pages that no query has touched.
     ///
     /// # Errors
     /// [`QueryError::Damaged`] with the first rule that does not hold. Triangles of earlier pages have been visited.

@@ -51,7 +51,7 @@ impl FloatState {
 /// Answers of this crate are exact in the default state only. With another rounding mode, bounds do not hold. Without
 /// subnormal numbers, small meshes seem to touch. Traps end the process. Threads of Rust are in the default state, but
 /// threads of C or C++ may not be: use this where they call Rust code. Threads that are started in the function start
-/// in the default state. That includes those of rayon's pool, which start at the first question that uses them.
+/// in the default state. That includes those of rayon's pool, which start at the first query that uses them.
 ///
 /// Cost: a few nanoseconds in the default state, some ten more in any other.
 #[inline]

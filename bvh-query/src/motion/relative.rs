@@ -11,7 +11,7 @@ use bvh_format::object::MAX_COORDINATE;
 ///
 /// All poses of both paths must be rigid to within 2^-23, and no translation may exceed 2^118. Within these limits
 /// there is always a relative pose. At a time without one, B counts as farther away than any mesh, and the sagitta of an
-/// interval that begins or ends there as infinite: neither a hit nor free. A question about such a path is refused with
+/// interval that begins or ends there as infinite: neither a hit nor free. A query about such a path is refused with
 /// [`NumberError::Unresolved`](crate::NumberError::Unresolved), unless it finds a hit before.
 ///
 /// ```

@@ -15,7 +15,7 @@ use crate::traverse::walk_memory::WalkMemory;
 use bvh_format::Stop;
 use std::sync::Arc;
 
-/// Asks questions about two meshes.
+/// Runs queries about two meshes.
 ///
 /// A querier holds the backend and the working memory of queries. Once the memory has grown to the size that the meshes
 /// need, a query allocates nothing. A querier keeps some decoded treelets from one query to the next, which does not

@@ -35,7 +35,7 @@ impl fmt::Display for InstanceLabel {
     }
 }
 
-/// Why a file makes no scene, why a scene refuses an instance or a change of it, or why a question about it has no answer.
+/// Why a file makes no scene, why a scene refuses an instance or a change of it, or why a query about it has no answer.
 ///
 /// ```
 /// use bvh_query::{Pose, Scene, SceneError};
@@ -52,7 +52,7 @@ impl fmt::Display for InstanceLabel {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The question about a pair has no answer.
+    /// The query about a pair has no answer.
     #[error("instances {a} and {b}: {source}")]
     Pair {
         /// The instance A.
@@ -62,7 +62,7 @@ pub enum SceneError {
         /// Why.
         source: QueryError,
     },
-    /// The question about an instance has no answer.
+    /// The query about an instance has no answer.
     #[error("instance {instance}: {source}")]
     Instance {
         /// The instance.
@@ -70,7 +70,7 @@ pub enum SceneError {
         /// Why.
         source: QueryError,
     },
-    /// The question as a whole has no answer, or what a file says of its instances breaks a rule of the format.
+    /// The query as a whole has no answer, or what a file says of its instances breaks a rule of the format.
     #[error(transparent)]
     Query(#[from] QueryError),
     /// A file without instances: it says nothing of a world.

@@ -1,6 +1,6 @@
 //! Groups, which select the pairs of instances that questions are about.
 
-/// The groups that an instance is in, and the groups that it meets, one bit per group. Questions are about two
+/// The groups that an instance is in, and the groups that it meets, one bit per group. Queries are about two
 /// instances if each is in a group that the other meets. By default an instance is in all groups and meets all.
 ///
 /// ```
@@ -27,7 +27,7 @@ impl Groups {
     /// In no group.
     pub(super) const NONE: Self = Self { member: 0, meets: 0 };
 
-    /// Returns whether questions are about two instances of these groups.
+    /// Returns whether queries are about two instances of these groups.
     pub fn meet(self, other: Self) -> bool {
         self.member & other.meets != 0 && other.member & self.meets != 0
     }

@@ -45,30 +45,30 @@ use std::sync::Arc;
 use trackers::Trackers;
 use workers::Workers;
 
-/// Many placed shapes, and questions over all pairs that may meet.
+/// Many placed shapes, and queries over all pairs that may meet.
 ///
-/// An instance is a shape with a pose in the world. A question is about all pairs of instances whose [`Groups`] meet
+/// An instance is a shape with a pose in the world. A query is about all pairs of instances whose [`Groups`] meet
 /// and whose contact is not allowed ([`Scene::set_allowed`]). The lower [`InstanceId`] of a pair is A. The answer about
 /// a pair is that of [`Querier`](crate::Querier) for `Pose::relative(world_a, world_b)`, and for the radii that margins
 /// make, to the bit. Answers are in
 /// ascending order of the pairs. They depend neither on the broad phase, nor on the backend, nor on the number of
-/// threads, nor on earlier questions.
+/// threads, nor on earlier queries.
 ///
-/// Errors may depend on the number of threads and on earlier questions in two cases. If a page is damaged, this holds
+/// Errors may depend on the number of threads and on earlier queries in two cases. If a page is damaged, this holds
 /// for [`Scene::collide`], [`Scene::within`] and [`Scene::distance`], whose answers may not need all pairs. If a budget
-/// runs out, it holds for every question: see [`Scene::set_budget`].
+/// runs out, it holds for every query: see [`Scene::set_budget`].
 ///
-/// A question first finds near pairs and then tests them, at most 65,536 at a time plus those of one more instance.
+/// A query first finds near pairs and then tests them, at most 65,536 at a time plus those of one more instance.
 /// Memory therefore grows with the number of instances and not with the number of pairs.
 ///
-/// Cost: moving an instance takes some 0.2 us. A question with nothing near takes some 1.7 us if 8 of 100 instances move
-/// (AMD EPYC, family 25). A question reads the object table of each file, and pages only of instances that are near
+/// Cost: moving an instance takes some 0.2 us. A query with nothing near takes some 1.7 us if 8 of 100 instances move
+/// (AMD EPYC, family 25). A query reads the object table of each file, and pages only of instances that are near
 /// another one.
 ///
 /// # Threads
 /// A clone takes 0.03 us, however many instances there are: clones share what the scene holds until one of them changes.
 /// The first change while another clone lives copies the tables, but no shape: see [`Scene::snapshot`]. So some threads
-/// may ask while others change the scene. Each question is about a snapshot, and nobody waits for a question:
+/// may ask while others change the scene. Each query is about a snapshot, and nobody waits for a query:
 ///
 /// ```
 /// use bvh_query::{Pose, Scene};
@@ -88,7 +88,7 @@ use workers::Workers;
 ///         for _ in 0..10 {
 ///             assert!(!own.collide().unwrap());
 ///             let now = shared.lock().unwrap().snapshot();
-///             own.clone_from(&now); // It keeps what it remembers of its questions.
+///             own.clone_from(&now); // It keeps what it remembers of its queries.
 ///         }
 ///     });
 ///     shared.lock().unwrap().set_shape(seen, next_cloud)
@@ -181,7 +181,7 @@ impl Scene {
 
     /// Creates a scene from the instances of a file, in their order. A bake with the option `scene` makes such files.
     ///
-    /// Cost: reading the instances, and some 0.5 to 1.5 us per instance. The rest of the file is read when a question
+    /// Cost: reading the instances, and some 0.5 to 1.5 us per instance. The rest of the file is read when a query
     /// needs it.
     ///
     /// # Errors
@@ -218,29 +218,29 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Lets questions use all threads of the rayon pool in which they are called. By default they use one thread.
+    /// Lets queries use all threads of the rayon pool in which they are called. By default they use one thread.
     #[cfg(feature = "parallel")]
     pub fn set_parallel(&mut self, parallel: bool) {
         self.workers.parallel = parallel;
     }
 
-    /// Lets the scene keep a [`Tracker`](crate::Tracker) for each pair, for questions about contact and about a
-    /// distance to compare with. It affects no answer, and saves time if instances move little from question to
-    /// question.
+    /// Lets the scene keep a [`Tracker`](crate::Tracker) for each pair, for queries about contact and about a
+    /// distance to compare with. It affects no answer, and saves time if instances move little from query to
+    /// query.
     ///
     /// On the project's test scenes, where instances move by some 3 degrees per frame, a frame takes 0.95 to 1.17 times
     /// as long. With a twentieth of these steps it takes 0.84 to 1.12 times as long, and with a two-hundredth 0.61 to
     /// 0.83 times. A tracker holds some 300 bytes. A scene has one for each of the first 16,384 pairs of the last
-    /// question, at most as many more for those of the question before, and up to 1,024 others.
+    /// query, at most as many more for those of the query before, and up to 1,024 others.
     ///
-    /// With a tracker, a question makes fewer visits. It may therefore have an answer where it would otherwise meet a
+    /// With a tracker, a query makes fewer visits. It may therefore have an answer where it would otherwise meet a
     /// damaged page or exceed the budget.
     pub fn set_tracking(&mut self, tracking: bool) {
         self.trackers.on = tracking;
     }
 
-    /// Limits each question to this many visits over all its pairs, and each point, ray or segment to this many over
-    /// all instances. Without a budget, only the number of instances and the sizes of the files limit a question.
+    /// Limits each query to this many visits over all its pairs, and each point, ray or segment to this many over
+    /// all instances. Without a budget, only the number of instances and the sizes of the files limit a query.
     ///
     /// Two kinds of visits count: those of [`Querier::set_budget`](crate::Querier::set_budget) for each pair tested,
     /// and those of the broad phase. The latter are the comparisons of a box with up to sixteen others at once, and the pairs
@@ -255,7 +255,7 @@ impl Scene {
         self.workers.pool.budget = visits;
     }
 
-    /// Stops each question when the flag is set, as [`Querier::set_stop`](crate::Querier::set_stop) does. The error is
+    /// Stops each query when the flag is set, as [`Querier::set_stop`](crate::Querier::set_stop) does. The error is
     /// [`SceneError::Pair`] or [`SceneError::Instance`] with [`QueryError::Stopped`](crate::QueryError::Stopped), or
     /// [`SceneError::Query`] with it in the broad phase. Copies of the scene share the flag.
     pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
@@ -366,7 +366,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Updates what the next question would update first, and returns a clone: the scene as it is now. Questions about
+    /// Updates what the next query would update first, and returns a clone: the scene as it is now. Queries about
     /// the clone then change nothing that both share. Take it under a lock, and ask without the lock; changes of this
     /// scene do not affect it.
     ///
@@ -378,7 +378,7 @@ impl Scene {
         self.clone()
     }
 
-    /// Gives an instance a margin in mesh units, which is added to the radius of its shape in every question. It is 0 at
+    /// Gives an instance a margin in mesh units, which is added to the radius of its shape in every query. It is 0 at
     /// first. What is attached to the instance has a margin of its own.
     ///
     /// # Errors
@@ -389,7 +389,7 @@ impl Scene {
         self.change(id, |instance| instance.margin = margin)
     }
 
-    /// Gives a pair of instances a margin in mesh units, besides those that each of both has. Questions about the pair add it to
+    /// Gives a pair of instances a margin in mesh units, besides those that each of both has. Queries about the pair add it to
     /// the margin of the lower instance, which is A. It is 0 at first.
     ///
     /// # Errors
@@ -437,7 +437,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Allows two instances to touch, or forbids it again. An allowed pair takes part in no question: neighbours on a robot,
+    /// Allows two instances to touch, or forbids it again. An allowed pair takes part in no query: neighbours on a robot,
     /// or a part and its gripper.
     ///
     /// # Errors
@@ -511,12 +511,12 @@ impl Scene {
         self.contents.each().next().is_none()
     }
 
-    /// Returns how much work the last question took, over all its pairs.
+    /// Returns how much work the last query took, over all its pairs.
     pub fn stats(&self) -> QueryStats {
         self.stats
     }
 
-    /// Returns how many times the last question asked about a pair of instances.
+    /// Returns how many times the last query asked about a pair of instances.
     pub fn pairs_asked(&self) -> u64 {
         self.pairs_asked
     }

@@ -106,7 +106,7 @@ struct BodyTracks<'a> {
 
 impl Scene {
     /// Returns whether the motions of some instances are free while they move in the world along `paths`, at the same
-    /// time, and the other instances stand still. The question is about all pairs with at least one moving instance
+    /// time, and the other instances stand still. The query is about all pairs with at least one moving instance
     /// whose groups meet and whose contact is not allowed. The present pose of a moving instance does not matter, and
     /// does not change.
     ///
@@ -142,7 +142,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NoInstance`] for an identifier of no instance, [`SceneError::Pose`] for a start or an end of a path that
     /// [`Scene::set_pose`] refuses; [`SceneError::Query`] for an invalid clearance or tolerance; and
-    /// [`SceneError::Pair`] with the first pair whose question has no answer before the earliest hit.
+    /// [`SceneError::Pair`] with the first pair whose query has no answer before the earliest hit.
     pub fn motion(
         &mut self,
         paths: &[(InstanceId, WorldPath<'_>)],

@@ -69,7 +69,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`SceneError::Pair`] with a pair whose question has no answer, because a page is damaged or the budget does not
+    /// [`SceneError::Pair`] with a pair whose query has no answer, because a page is damaged or the budget does not
     /// suffice, unless another pair is found to touch.
     pub fn collide(&mut self) -> Result<bool, SceneError> {
         self.any(0.0)
@@ -110,7 +110,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`SceneError::Pair`] with the first pair whose question has no answer.
+    /// [`SceneError::Pair`] with the first pair whose query has no answer.
     pub fn pairs_in_contact(&mut self) -> Result<Vec<ScenePair>, SceneError> {
         self.pairs_within(0.0)
     }
@@ -326,7 +326,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`SceneError::Pair`] with a pair whose question has no answer. Pairs that are certainly farther apart than
+    /// [`SceneError::Pair`] with a pair whose query has no answer. Pairs that are certainly farther apart than
     /// another one are not tested.
     pub fn distance(&mut self) -> Result<Option<SceneDistance>, SceneError> {
         self.start();

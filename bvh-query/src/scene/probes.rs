@@ -71,7 +71,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Query`] for a point or limit that [`Querier::closest_point`] refuses, and [`SceneError::Instance`]
-    /// with an instance whose question has no answer. If several points fail, the error is that of the first.
+    /// with an instance whose query has no answer. If several points fail, the error is that of the first.
     pub fn closest_points(
         &mut self,
         points: &[[f64; 3]],
@@ -155,7 +155,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Query`] for a ray that [`Querier::first_hit`] refuses, and [`SceneError::Instance`] with an
-    /// instance whose question has no answer. If several rays fail, the error is that of the first.
+    /// instance whose query has no answer. If several rays fail, the error is that of the first.
     pub fn first_hits(&mut self, rays: &[Ray]) -> Result<Vec<Option<SceneRayHit>>, SceneError> {
         self.each_probe(rays, |search, ray| {
             let mut first = First::new(ray)?;
@@ -233,7 +233,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Query`] for ends that [`Querier::segment_hit`] refuses, and [`SceneError::Instance`] with an
-    /// instance whose question has no answer. If several segments fail, the error is that of the first.
+    /// instance whose query has no answer. If several segments fail, the error is that of the first.
     pub fn segment_hits(&mut self, segments: &[[[f64; 3]; 2]]) -> Result<Vec<bool>, SceneError> {
         self.each_probe(segments, |search, [from, to]| {
             let mut question = MeetsSegment::new(*from, *to)?;

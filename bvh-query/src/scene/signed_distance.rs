@@ -72,7 +72,7 @@ impl Scene {
     /// Returns all pairs that overlap or are at most `margin` apart, in mesh units, in ascending order, with their signed distances:
     /// those for which [`Querier::signed_distance_within`](crate::Querier::signed_distance_within) has an answer.
     ///
-    /// Cost: that question for each pair whose boxes in the world are within the margin.
+    /// Cost: that query for each pair whose boxes in the world are within the margin.
     ///
     /// ```
     /// use bvh_query::PenetrationOptions;

@@ -38,7 +38,7 @@ thread_local! {
     static STEPS: RefCell<Option<(usize, Vec<Step>)>> = const { RefCell::new(None) };
 }
 
-/// Asks a question on this thread, and returns the answer with the first `most` steps of its walks.
+/// Runs a query on this thread, and returns the answer with the first `most` steps of its walks.
 pub fn record<T>(most: usize, ask: impl FnOnce() -> T) -> (T, Vec<Step>) {
     STEPS.set(Some((most, Vec::new())));
     let answer = ask();

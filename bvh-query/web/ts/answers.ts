@@ -1,4 +1,4 @@
-/** The types of answers. The answer to a question about N poses, points or rays has N elements or rows in each array. */
+/** The types of answers. The answer to a query about N poses, points or rays has N elements or rows in each array. */
 
 /** The relation of two meshes. `Relation[number]` is its name. */
 export enum Relation {
@@ -304,7 +304,7 @@ export interface ContactRegions {
     error: Float64Array;
     /** The sums of the radii less the distances of the triangles; 0 for meshes without radii. */
     overlap: Float64Array;
-    /** The number of all contacts, which is larger than K if the question was about the first ones only. */
+    /** The number of all contacts, which is larger than K if the query was about the first ones only. */
     total: number;
 }
 
@@ -422,7 +422,7 @@ export interface ClosestPoints {
     lower: Float64Array;
     /** Certified upper bounds of the least distances. */
     upper: Float64Array;
-    /** The closest points, in the frame of the question: length 3 N. */
+    /** The closest points, in the frame of the query: length 3 N. */
     point: Float64Array;
     /** Numbers of objects in the file. */
     object: Uint32Array;
@@ -440,7 +440,7 @@ export interface RayHits {
     lower: Float64Array;
     /** Certified upper bounds of the parameters. */
     upper: Float64Array;
-    /** The hits, in the frame of the question: length 3 N. */
+    /** The hits, in the frame of the query: length 3 N. */
     point: Float64Array;
     /** Numbers of objects in the file. */
     object: Uint32Array;

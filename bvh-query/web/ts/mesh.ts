@@ -1,4 +1,4 @@
-/** Meshes, and all questions about one mesh or a pair. */
+/** Meshes, and all queries about one mesh or a pair. */
 
 import * as answers from "./answers.js";
 import type {
@@ -61,7 +61,7 @@ export interface BakeOptions {
     effort?: string;
     /** Whether triangles keep their numbers from the input; else the baker numbers them in its own order. True by default. */
     ids?: boolean;
-    /** Whether the file states which objects are closed, which questions about the inside need. True by default. */
+    /** Whether the file states which objects are closed, which queries about the inside need. True by default. */
     topology?: boolean;
     /** The radius of the mesh in mesh units, as of `rounded`, which the file then states. 0 by default. */
     radius?: number;
@@ -208,7 +208,7 @@ const placed = (value: Numbers | undefined) => (value === undefined ? undefined 
 /**
  * A mesh in the bytes of a `.cbvh` file: all objects of the file, or one. It never changes.
  *
- * Questions whose names end in `Each` are about N poses or paths, and answer with arrays; so do those about points and rays.
+ * Queries whose names end in `Each` are about N poses or paths, and answer with arrays; so do those about points and rays.
  * A pose is that of the other mesh in the frame of this one: see `pose`.
  */
 export class Mesh extends Handle<raw.Mesh> {
@@ -343,7 +343,7 @@ export class Mesh extends Handle<raw.Mesh> {
         return this.#call((mesh) => mesh.triangles());
     }
 
-    /** Checks every rule in the whole file. Questions check only the parts that they touch. */
+    /** Checks every rule in the whole file. Queries check only the parts that they touch. */
     validate(): void {
         this.#call((mesh) => mesh.validate());
     }
@@ -492,7 +492,7 @@ export class Mesh extends Handle<raw.Mesh> {
 
     /**
      * How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place? Flush faces overlap or come
-     * apart by roundings in nearly all poses, so that a tolerance is part of the question: parts that are no farther apart and no
+     * apart by roundings in nearly all poses, so that a tolerance is part of the query: parts that are no farther apart and no
      * deeper in each other, by the depth of `penetration`, are touching. Meshes need not be closed.
      */
     clash(other: Mesh, pose: Numbers, options: ClashOptions = {}): Clash {
@@ -544,7 +544,7 @@ export class Mesh extends Handle<raw.Mesh> {
     }
 
     /**
-     * Which edges leave this mesh open, so that questions about what is inside have no answer? None if it is closed. Duplicates count
+     * Which edges leave this mesh open, so that queries about what is inside have no answer? None if it is closed. Duplicates count
      * with their orientation. Throws if the mesh was baked without topology.
      */
     openEdges(): OpenEdges {

@@ -1,5 +1,5 @@
 /**
- * Meshes and scenes that live in a worker, and whose questions answer with promises, so that a page never waits.
+ * Meshes and scenes that live in a worker, and whose queries answer with promises, so that a page never waits.
  *
  * Nothing is listed here: methods of `Mesh`, `Scene` and `Motion` are forwarded by name, and their types follow. `serve` is the
  * other end.
@@ -133,7 +133,7 @@ const remotes = { Mesh: forwarding(Mesh), Scene: forwarding(Scene), Motion: forw
  * A worker with a module of its own, and the package as seen from outside it: `worker.Mesh.bake(…)`, `worker.box(…)` and
  * `worker.Motion.between(…)` are those of the package, and return promises, as do all methods and properties of what they make.
  *
- * A worker answers one question after the other, in the order in which they were asked, and with the same bits as the package. For
+ * A worker answers one query after the other, in the order in which they were asked, and with the same bits as the package. For
  * more cores, start more workers, and send each of them the meshes (`await mesh.bytes()`). Arguments are copied to the worker;
  * answers are moved out of it.
  */
@@ -197,7 +197,7 @@ export class CbvhWorker {
         return worker as CbvhWorker & RemoteFunctions;
     }
 
-    /** Ends the worker at once, in the middle of a question, too. All its memory is freed, and questions without an answer fail. */
+    /** Ends the worker at once, in the middle of a query, too. All its memory is freed, and queries without an answer fail. */
     terminate(): void {
         this.#end(new Error("cbvh: expected a worker in use, found one that was terminated"));
     }

@@ -1,4 +1,4 @@
-/** Scenes: many placed meshes, and questions over all pairs of them that may meet. */
+/** Scenes: many placed meshes, and queries over all pairs of them that may meet. */
 
 import * as answers from "./answers.js";
 import type {
@@ -49,17 +49,17 @@ export interface InstanceOptions {
     name?: string;
     /** The groups that the instance is in, one bit for each of 32. All by default. */
     member?: number;
-    /** The groups that it meets. Questions are about two instances if each is in a group that the other meets. */
+    /** The groups that it meets. Queries are about two instances if each is in a group that the other meets. */
     meets?: number;
 }
 
 const ALL_GROUPS = 0xffff_ffff;
 
 /**
- * Many placed meshes, and questions over all pairs that may meet.
+ * Many placed meshes, and queries over all pairs that may meet.
  *
  * An instance is a mesh with its pose in the world. `add` returns its number, which is never given again. Arguments may name
- * an instance by its name instead, if it has one; answers have numbers. The first instance of a pair is A. A question is about
+ * an instance by its name instead, if it has one; answers have numbers. The first instance of a pair is A. A query is about
  * all pairs of instances whose groups meet and whose contact is not allowed. Answers are in the order of the pairs, and each is
  * that of `Mesh` for the pose of B in A's frame, to the bit.
  */
@@ -189,7 +189,7 @@ export class Scene extends Handle<raw.Scene> {
         return { member: member as number, meets: meets as number };
     }
 
-    /** Allows two instances to touch or, with `false`, no longer. Questions about all pairs leave out pairs that may touch. */
+    /** Allows two instances to touch or, with `false`, no longer. Queries about all pairs leave out pairs that may touch. */
     setAllowed(a: Instance, b: Instance, allowed = true): void {
         const [first, second, chosen] = [this.#number(a, "a"), this.#number(b, "b"), flag(allowed, "allowed")];
         this.#call((scene) => scene.setAllowed(first, second, chosen));
@@ -200,7 +200,7 @@ export class Scene extends Handle<raw.Scene> {
         return this.#call((scene) => scene.allowed());
     }
 
-    /** Gives an instance a margin in mesh units, which is added to the radius of its mesh in every question. 0 at first. */
+    /** Gives an instance a margin in mesh units, which is added to the radius of its mesh in every query. 0 at first. */
     setMargin(id: Instance, margin: number): void {
         const [number, length] = [this.#number(id, "id"), float(margin, "margin")];
         this.#call((scene) => scene.setMargin(number, length));
@@ -248,7 +248,7 @@ export class Scene extends Handle<raw.Scene> {
     }
 
     /** Whether the scene reuses earlier results about each pair. This affects no answer, and saves time if instances move
-     * little from question to question. Off at first. */
+     * little from query to query. Off at first. */
     setTracking(tracking: boolean): void {
         const chosen = flag(tracking, "tracking");
         this.#call((scene) => scene.setTracking(chosen));

@@ -11,7 +11,7 @@ False
 >>> tetrahedron.distance(tetrahedron, pose).distance
 2.0
 
-**Poses** are arrays of shape (4, 4), for one question, or (N, 4, 4), for N questions. A pose maps *body to world*: a
+**Poses** are arrays of shape (4, 4), for one query, or (N, 4, 4), for N queries. A pose maps *body to world*: a
 point ``x`` of the body stands at ``pose[:3, :3] @ x + pose[:3, 3]`` in the world. For two meshes, the world is the
 frame of the first one. Rotations must be rigid to within 2^-20, and those of scenes and of `relative` to within 2^-23.
 Matrices with eight digits after the point are. `nearest_pose` makes a pose from a matrix that is less exact.
@@ -33,8 +33,8 @@ itself.
 **Robots** are read from URDF files and asked about with the values of their joints (`Robot`). A body that starts inside a
 closed obstacle that is no solid does not touch it, and `InsideWarning` says so.
 
-**Answers** to one question are plain values. Answers to N questions are arrays of N elements or rows, or lists of N
-arrays if each question may have any number of results. Lengths are in mesh units. Contact and insides are decided
+**Answers** to one query are plain values. Answers to N queries are arrays of N elements or rows, or lists of N
+arrays if each query may have any number of results. Lengths are in mesh units. Contact and insides are decided
 exactly. Touching is contact, and meshes are surfaces, unless they are made solid.
 
 **Shapes.** `sphere`, `capsule`, `box`, `cylinder`, `cone`, `convex_hull`, `cloud`, `voxels`, `octree`, `height_field` and
@@ -42,18 +42,18 @@ exactly. Touching is contact, and meshes are surfaces, unless they are made soli
 
 **Seeing.** `Mesh.view` and `Scene.view` make a page that shows meshes, which a notebook shows at once (`View`).
 
-**Threads.** While a question is asked, other threads of Python run, and any number of threads may ask at the same time.
-``parallel=True`` divides the N questions of one call among all cores; the answers are the same bits. A question is
-about a `Scene` as it is when the question begins, and a path of your own is called on the thread of its question. Arrays
-are copied before a question runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
+**Threads.** While a query runs, other threads of Python run, and any number of threads may ask at the same time.
+``parallel=True`` divides the N queries of one call among all cores; the answers are the same bits. A query is
+about a `Scene` as it is when the query begins, and a path of your own is called on the thread of its query. Arrays
+are copied before a query runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock
 enables the lock when it imports this module.
 
-**Stopping.** In the block of a `Stop`, questions and bakes end when another thread sets its flag, or after a time. Ctrl-C ends those of the
+**Stopping.** In the block of a `Stop`, queries and bakes end when another thread sets its flag, or after a time. Ctrl-C ends those of the
 main thread, within about a tenth of a second. A bake that is stopped leaves no file behind.
 
 Errors are exceptions: ``ValueError`` for invalid arguments, ``TypeError`` for arguments of a wrong type, ``KeyError``
 for instances that a scene does not have, ``OSError`` for files that the system refuses, ``FormatError`` for files that
-are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked, ``StoppedError`` for questions and bakes that a
+are damaged or are not .cbvh files, ``BakeError`` for meshes that cannot be baked, ``StoppedError`` for queries and bakes that a
 `Stop` ends.
 """
 

@@ -120,7 +120,7 @@ class ClashClass(_Named):
 
 
 class Distance(NamedTuple):
-    """The least distance of two meshes. After N questions, each field has N elements or rows.
+    """The least distance of two meshes. After N queries, each field has N elements or rows.
 
     - ``distance``: the distance in mesh units; 0 if they touch. Shape () or (N,).
     - ``lower``: a certified lower bound of the least distance of the meshes.
@@ -144,7 +144,7 @@ class Distance(NamedTuple):
 
 
 class Separation(NamedTuple):
-    """How far the second mesh moves along a direction until the insides are disjoint. After N questions, each field has N
+    """How far the second mesh moves along a direction until the insides are disjoint. After N queries, each field has N
     elements or rows.
 
     - ``lower``: the insides meet at all shorter moves along the direction, in mesh units. Shape () or (N,).
@@ -159,7 +159,7 @@ class Separation(NamedTuple):
 
 
 class Penetration(NamedTuple):
-    """How deep two meshes overlap. After N questions, each field has N elements or rows.
+    """How deep two meshes overlap. After N queries, each field has N elements or rows.
 
     - ``lower``: no shorter translation makes the insides disjoint, in mesh units. Shape () or (N,).
     - ``upper``: the length of ``translation``.
@@ -180,7 +180,7 @@ class Penetration(NamedTuple):
 
 
 class SignedDistance(NamedTuple):
-    """How far apart two meshes are or, below zero, how deep they overlap. After N questions, each field has N elements or
+    """How far apart two meshes are or, below zero, how deep they overlap. After N queries, each field has N elements or
     rows.
 
     - ``lower``: the signed distance is at least this, in mesh units. Shape () or (N,).
@@ -210,7 +210,7 @@ class SignedDistance(NamedTuple):
 
 
 class Intersection(NamedTuple):
-    """What two meshes have in common, in mesh units. After N questions, each field has N elements or rows. Only the volume's error is
+    """What two meshes have in common, in mesh units. After N queries, each field has N elements or rows. Only the volume's error is
     certified; all other numbers are rounded.
 
     - ``volume``: the volume of the intersection. Shape () or (N,).
@@ -247,7 +247,7 @@ class IntersectionSurface(NamedTuple):
 
 
 class Clash(NamedTuple):
-    """How two parts of an assembly lie, and by how much. After N questions, each field has N elements or rows.
+    """How two parts of an assembly lie, and by how much. After N queries, each field has N elements or rows.
 
     - ``kind``: a `ClashClass` or, for N poses, their numbers as uint8, shape (N,), printed as names.
     - ``relation``: whether they touch and, if not, whether one is inside the other: a `Relation`, or numbers likewise.
@@ -394,7 +394,7 @@ class OpenEdges(NamedTuple):
 
 
 class MotionAnswer(NamedTuple):
-    """Whether a path is free, and where it ends if it is not. After N questions, each field has N elements or rows.
+    """Whether a path is free, and where it ends if it is not. After N queries, each field has N elements or rows.
 
     - ``kind``: a `MotionKind` or, for N paths, their numbers as uint8, shape (N,), printed as names.
     - ``free_until``: before this time, from 0 to 1, the meshes certainly are not within the clearance. 1 if the path is
@@ -412,14 +412,14 @@ class MotionAnswer(NamedTuple):
 
 
 class ClosestPoint(NamedTuple):
-    """The point of a mesh that is closest to a point. After N questions, each field has N elements or rows.
+    """The point of a mesh that is closest to a point. After N queries, each field has N elements or rows.
 
     - ``found``: whether there is such a point within the given distance. If not, the numbers are NaN and 0. Shape () or
       (N,).
     - ``distance``: the distance in mesh units.
     - ``lower``: a certified lower bound of the least distance.
     - ``upper``: a certified upper bound of it.
-    - ``point``: the closest point, in the frame of the question. Shape (3,) or (N, 3).
+    - ``point``: the closest point, in the frame of the query. Shape (3,) or (N, 3).
     - ``object``: the number of the object in the file. An int, or an array of uint32.
     - ``triangle``: the number of the triangle in the input or, in a file without ids, of its place. The same type.
     """
@@ -434,13 +434,13 @@ class ClosestPoint(NamedTuple):
 
 
 class RayHit(NamedTuple):
-    """Where a ray hits a mesh. After N questions, each field has N elements or rows.
+    """Where a ray hits a mesh. After N queries, each field has N elements or rows.
 
     - ``found``: whether it hits. If not, the numbers are NaN and 0. Shape () or (N,).
     - ``t``: the parameter: the hit is at origin + t * direction.
     - ``lower``: a certified lower bound of the parameter.
     - ``upper``: a certified upper bound of it.
-    - ``point``: the hit, in the frame of the question. Shape (3,) or (N, 3).
+    - ``point``: the hit, in the frame of the query. Shape (3,) or (N, 3).
     - ``object``: the number of the object in the file. An int, or an array of uint32.
     - ``triangle``: the number of the triangle in the input or, in a file without ids, of its place. The same type.
     """
@@ -572,7 +572,7 @@ class SceneMotionAnswer(NamedTuple):
 
 
 class SceneClosestPoint(NamedTuple):
-    """The point of all instances that is closest to a point. After N questions, each field has N elements or rows.
+    """The point of all instances that is closest to a point. After N queries, each field has N elements or rows.
 
     - ``instance``: the number of the instance; -1 if nothing is found. Shape () or (N,).
     - ``closest``: the answer of `Mesh.closest_points`, in the world.
@@ -583,7 +583,7 @@ class SceneClosestPoint(NamedTuple):
 
 
 class SceneRayHit(NamedTuple):
-    """Where a ray hits an instance. After N questions, each field has N elements or rows.
+    """Where a ray hits an instance. After N queries, each field has N elements or rows.
 
     - ``instance``: the number of the instance; -1 if nothing is hit. Shape () or (N,).
     - ``hit``: the answer of `Mesh.first_hits`, in the world.

@@ -1,6 +1,6 @@
 """The compiled part of cbvh. It reads arrays as callers give them; see the package for their shapes, and what users call.
 
-Answers to one question alone are plain values, to N questions arrays (Any)."""
+Answers to one query alone are plain values, to N queries arrays (Any)."""
 
 import os
 from typing import Any, Callable, Sequence, final

@@ -1,4 +1,4 @@
-"""Meshes, and all questions about one mesh or a pair."""
+"""Meshes, and all queries about one mesh or a pair."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ class Mesh:
         return self._mesh.is_solid()
 
     def validate(self) -> None:
-        """Checks all checksums and rules of the whole file. Questions check only the parts that they touch.
+        """Checks all checksums and rules of the whole file. Queries check only the parts that they touch.
 
         Raises FormatError for the first rule that is broken.
         """
@@ -357,7 +357,7 @@ class Mesh:
     ) -> Clash:
         """How do they lie: apart, near, touching, overlapping, one in the other, or twice in one place?
 
-        Flush faces overlap or come apart by roundings in nearly all poses, so that a tolerance is part of the question: parts
+        Flush faces overlap or come apart by roundings in nearly all poses, so that a tolerance is part of the query: parts
         that are no farther apart and no deeper in each other, by the depth of `penetration`, are touching. Where a part fits another one
         without a gap, like a peg in its hole, the depth is mostly undecided. Parts need not be closed.
 
@@ -366,7 +366,7 @@ class Mesh:
         at most this deep in each other, are touching, in mesh units; None: a millionth of the largest side of both. The search for a depth ends when
         ``upper`` exceeds ``lower`` by no more than ``relative_gap`` of it, a part above 0, or after ``visits`` visits of nodes
         and triangles; None: no limit. ``magnitudes``: whether to measure what parts have in common, as `intersection` does, and to
-        divide overlapping parts into piercing and protruding ones. Raises ValueError where the question is about the inside of a mesh that was baked without
+        divide overlapping parts into piercing and protruding ones. Raises ValueError where the query is about the inside of a mesh that was baked without
         topology.
         """
         asked = (self._mesh, _other(other), poses, parallel)
@@ -464,7 +464,7 @@ class Mesh:
         return SelfContacts(triangles, named(SelfContactKind, kind), total)
 
     def open_edges(self) -> OpenEdges:
-        """The edges that leave the mesh open, so that questions about what is inside have no answer; none if it is closed.
+        """The edges that leave the mesh open, so that queries about what is inside have no answer; none if it is closed.
 
         Duplicates count with their orientation. Cost: about a third of a second per million triangles of an open mesh at
         the first call. Raises ValueError if the mesh was baked without topology.
@@ -635,7 +635,7 @@ def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
     """Maps a ``.cbvh`` file, or one object of it by number or name. Takes microseconds, whatever the size.
 
     The bytes of the file must not change while it is open. If they do, answers are undefined, and formally so is
-    everything that the process does. If the file is truncated, the system ends the process as soon as a question needs
+    everything that the process does. If the file is truncated, the system ends the process as soon as a query needs
     the missing part. Replace a file by renaming another one over it, as `save` does. `Mesh.from_bytes` copies instead.
     A file that is already damaged raises FormatError.
     """

@@ -15,7 +15,7 @@ from ._answers import Floats
 class Path(Protocol):
     """A path: any object with these two methods. `Motion` and `Polyline` are paths, and you can define your own.
 
-    Both methods are called with Python's lock, on the thread of the question. An exception ends the question, which
+    Both methods are called with Python's lock, on the thread of the query. An exception ends the query, which
     raises it.
     """
 
@@ -33,7 +33,7 @@ class Path(Protocol):
 
         The bound must hold for poses as computed, with all rounding. Answers are only as certain as this bound, and the
         smaller it is, the less work they take. Infinity means that nothing is known; if it is returned for every
-        interval, the question ends with a ValueError. The question also ends with a ValueError if `pose` departs
+        interval, the query ends with a ValueError. The query also ends with a ValueError if `pose` departs
         further in the middle of an interval.
         """
 

@@ -33,7 +33,7 @@ def nearest_pose(matrix: ArrayLike) -> Floats:
 
 
 def relative(a: ArrayLike, b: ArrayLike) -> Floats:
-    """Poses of B in A's frame from the poses of both in the world: shape (4, 4) or (N, 4, 4). Questions about two
+    """Poses of B in A's frame from the poses of both in the world: shape (4, 4) or (N, 4, 4). Queries about two
     meshes take such poses.
 
     ``a`` and ``b`` (body to world) have shape (4, 4) or (N, 4, 4); one of either serves N of the other. The result is

@@ -1,4 +1,4 @@
-"""Robots: questions in joint space, about a URDF among obstacles."""
+"""Robots: queries in joint space, about a URDF among obstacles."""
 
 from __future__ import annotations
 
@@ -111,13 +111,13 @@ class InsideWarning(UserWarning):
 class Robot:
     """A robot among obstacles, asked about with the values of its joints.
 
-    A body is a link, an obstacle or an attached object. Questions are about all pairs of bodies that can move against each
+    A body is a link, an obstacle or an attached object. Queries are about all pairs of bodies that can move against each
     other, but for those whose contact is allowed: by `allow`, or by the SRDF. Links that only fixed joints connect, and
     obstacles among themselves, are never asked about. Links are surfaces, if they are meshes, and primitives are solid.
 
     An array of joint values ``q`` has shape (n,) for one configuration, or (N, n) for N of them, in the order of `joints`.
     Angles are in radians, lengths in metres. Answers are certain, and the same bits on all systems. ``parallel=True`` divides
-    N configurations among all cores. Threads may share a robot: a question is about the robot as it is when the question
+    N configurations among all cores. Threads may share a robot: a query is about the robot as it is when the query
     begins. A robot can be copied and pickled. A pickle holds all of it: links, obstacles, attached objects, margins and allowed
     pairs, and no file of the robot is read again. A mesh that was opened from a file is pickled as its path, like any `Mesh`.
 
@@ -129,7 +129,7 @@ class Robot:
 
     __slots__ = ("_robot", "_unseen")
     _robot: _cbvh.Robot
-    # The surfaces among obstacles that no question has been asked about, which then warns of what is inside.
+    # The surfaces among obstacles that no query has been about, which then warns of what is inside.
     _unseen: frozenset[str]
 
     def __init__(self) -> None:
@@ -228,7 +228,7 @@ class Robot:
     @property
     def limits(self) -> NDArray[np.float64]:
         """The lower and upper limit of each joint value, shape (n, 2), infinite where there is none. A lower limit above the upper
-        one is none, with a warning. No question checks them."""
+        one is none, with a warning. No query checks them."""
         return np.array(self._robot.limits(), dtype=np.float64).reshape(-1, 2)
 
     @property

@@ -1,4 +1,4 @@
-"""Scenes: many placed meshes, and questions over all pairs of them that may meet."""
+"""Scenes: many placed meshes, and queries over all pairs of them that may meet."""
 
 from __future__ import annotations
 
@@ -54,18 +54,18 @@ def _groups(value: Any, name: str) -> int:
 
 
 class Scene:
-    """Many placed meshes, and questions over all pairs that may meet.
+    """Many placed meshes, and queries over all pairs that may meet.
 
     An instance is a mesh with its pose in the world (body to world). `add` returns its number, which is never given
     again. The number of an instance that was removed raises KeyError. Arguments may name an instance by its name
     instead, if it has one; answers have numbers. Iterating over a scene gives the numbers of its instances in their
-    order. The first instance of a pair is A. A question is about all pairs of instances whose groups meet and whose
+    order. The first instance of a pair is A. A query is about all pairs of instances whose groups meet and whose
     contact is not allowed. Answers are in the order of the pairs, and each is that of `Mesh` for the pose of B in A's
     frame, to the bit.
 
-    **Threads** may share a scene. A question is about the scene as it is when the question begins. Other threads run
-    meanwhile: they may ask, or change poses, margins and meshes, and nobody waits for a question. The first change
-    during a question copies the tables of the scene (2 us for 60 instances, 0.3 ms for 10,000), and no mesh. Changes that
+    **Threads** may share a scene. A query is about the scene as it is when the query begins. Other threads run
+    meanwhile: they may ask, or change poses, margins and meshes, and nobody waits for a query. The first change
+    during a query copies the tables of the scene (2 us for 60 instances, 0.3 ms for 10,000), and no mesh. Changes that
     belong together can be seen one by one, except those of `set_poses`: to ask about all or none of them, make them in a
     `copy`, and let other threads ask that one. A copy takes a microsecond.
     Pickling keeps instances, numbers, names, poses, groups, margins, attachments and allowed pairs. Each mesh is pickled
@@ -144,7 +144,7 @@ class Scene:
 
         ``pose`` (body to world) has shape (4, 4); None is the identity. It must be rigid to within 2^-23. ``name``: a
         name that no other instance has. ``member`` are the groups that the instance is in, and ``meets`` those that it
-        meets, one bit for each of 32. Questions are about two instances if each is in a group that the other meets.
+        meets, one bit for each of 32. Queries are about two instances if each is in a group that the other meets.
         ``solid`` makes what is inside touch the instance, as `Mesh.solid` does; ValueError if the mesh is not closed.
         Without it, what is wholly inside a mesh does not touch it, and `relations` tells of it.
         """
@@ -212,7 +212,7 @@ class Scene:
         return self._scene.groups(self._number(id, "id"))
 
     def set_allowed(self, a: int | str, b: int | str, allowed: bool = True) -> None:
-        """Allows two instances to touch, such as neighbours on a robot, or forbids it again. No question is about an
+        """Allows two instances to touch, such as neighbours on a robot, or forbids it again. No query is about an
         allowed pair."""
         self._scene.set_allowed(self._number(a, "a"), self._number(b, "b"), bool(allowed))
 
@@ -221,7 +221,7 @@ class Scene:
         return self._scene.allowed()
 
     def set_margin(self, id: int | str, margin: float) -> None:
-        """Gives an instance a margin in mesh units, which is added to the radius of its mesh in every question. 0 at first.
+        """Gives an instance a margin in mesh units, which is added to the radius of its mesh in every query. 0 at first.
         What is attached to the instance has a margin of its own."""
         self._scene.set_margin(self._number(id, "id"), _length(margin, "margin"))
 
@@ -301,7 +301,7 @@ class Scene:
 
     @property
     def parallel(self) -> bool:
-        """Whether a question uses all cores, or as many as the environment variable ``RAYON_NUM_THREADS`` says. Answers
+        """Whether a query uses all cores, or as many as the environment variable ``RAYON_NUM_THREADS`` says. Answers
         have the same bits. False by default."""
         return self._scene.switches()[0]
 
@@ -312,7 +312,7 @@ class Scene:
     @property
     def tracking(self) -> bool:
         """Whether the scene reuses earlier results about each pair. This affects no answer, and saves time if instances
-        move little from question to question. False by default."""
+        move little from query to query. False by default."""
         return self._scene.switches()[1]
 
     @tracking.setter
@@ -455,7 +455,7 @@ class Scene:
         of_rows: NDArray[Any] = inverse.reshape(-1, 2)
         poses, meshes = self.poses(places), [self.mesh(number) for number in places.tolist()]
         relative_poses = _cbvh.relative_poses(poses[of_rows[:, 0]], poses[of_rows[:, 1]])
-        # One question per pair of meshes and margins, of which a scene has few.
+        # One query per pair of meshes and margins, of which a scene has few.
         of_pair = {(a, b): margin for a, b, margin in self._scene.pair_margins()}
         margins = [self.margin(number) for number in places.tolist()]
         numbers: dict[tuple[Mesh, float], int] = {}
@@ -465,7 +465,7 @@ class Scene:
             for side, key in enumerate(((meshes[a], margins[a] + further), (meshes[b], margins[b]))):
                 kinds[row, side] = numbers.setdefault(key, len(numbers))
         shapes = [mesh.rounded(mesh.radius + margin) if margin else mesh for mesh, margin in numbers]
-        # The answer to no question tells the parts, and the other arguments are checked.
+        # The answer to no query tells the parts, and the other arguments are checked.
         empty = _empty()
         parts = [np.zeros((len(rows), *part.shape[1:]), part.dtype) for part in ask(empty, empty, relative_poses[:0])]
         for a, b in np.unique(kinds, axis=0).tolist():
@@ -550,7 +550,7 @@ class Scene:
         still?
 
         ``paths`` maps the number or name of each moving instance to a `Motion`, a `Polyline` or a path of your own
-        (body to world). The question is about all pairs with at least one moving instance. ``clearance`` and
+        (body to world). The query is about all pairs with at least one moving instance. ``clearance`` and
         ``tolerance`` are those of `Mesh.motion`. The present pose of a moving instance does not matter, and does not
         change. What is attached to a moving instance moves with it, unless it has a path of its own.
         """
@@ -579,7 +579,7 @@ class Scene:
 
 @functools.cache
 def _empty() -> Mesh:
-    """A mesh that no question is asked about."""
+    """A mesh that no query is about."""
     return Mesh(_cbvh.cloud_core([[0, 0, 0]]))
 
 

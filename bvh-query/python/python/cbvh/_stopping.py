@@ -1,4 +1,4 @@
-"""What stops questions and bakes that take long."""
+"""What stops queries and bakes that take long."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from . import _cbvh
 
 
 class Stop:
-    """Stops questions and bakes of the thread that is in its block, by a flag that any thread may set, or after a time.
+    """Stops queries and bakes of the thread that is in its block, by a flag that any thread may set, or after a time.
 
     >>> stop = cbvh.Stop()                                                   # doctest: +SKIP
     >>> button.on_click(stop.set)                                            # doctest: +SKIP
     >>> with stop:                                                           # doctest: +SKIP
     ...     answers = room.distance(robot, poses, parallel=True)
 
-    When the flag is set, a question under way raises `StoppedError` within a millisecond or so, and so does each later one of the block
+    When the flag is set, a query under way raises `StoppedError` within a millisecond or so, and so does each later one of the block
     until `clear`. ``Stop(after=seconds)`` does the same once so much time has passed in the block:
 
     >>> with cbvh.Stop(after=0.1):                                           # doctest: +SKIP
@@ -38,7 +38,7 @@ class Stop:
         self._flag.set(True)
 
     def clear(self) -> None:
-        """Clears the flag, so that questions are answered again. A time that has passed stays passed until the block ends."""
+        """Clears the flag, so that queries are answered again. A time that has passed stays passed until the block ends."""
         self._flag.set(False)
 
     def is_set(self) -> bool:

@@ -503,7 +503,7 @@ def _manager(manager: Any) -> CollisionManager:
 
 
 class _Added:
-    """Objects that are in a scene for one question."""
+    """Objects that are in a scene for one query."""
 
     __slots__ = ("_scene", "_others", "_added")
 

@@ -144,7 +144,7 @@ impl ClashOptions {
 impl Querier {
     /// Returns how two parts lie, with B placed by a pose in A's frame.
     ///
-    /// A tolerance is part of the question. A pose that turns by anything but right angles rounds each vertex that it places, by
+    /// A tolerance is part of the query. A pose that turns by anything but right angles rounds each vertex that it places, by
     /// about 1e-16 of its coordinates, so that flush faces overlap or come apart by as much. Both count as touching: parts within
     /// the tolerance of each other, which is exact as [`Querier::within`] is, and parts whose depth ([`Querier::penetration`]) is at
     /// most the tolerance. Where a part fits another one without a gap, like a peg in its hole, the depth is mostly undecided:

@@ -63,7 +63,7 @@ options! {
 }
 
 impl MotionOptions {
-    /// Returns the tolerance of a question about two shapes, in mesh units: the one that is set, or else the default. That
+    /// Returns the tolerance of a query about two shapes, in mesh units: the one that is set, or else the default. That
     /// is a millionth of the smaller of both sizes, where the size of a shape is the largest diagonal of the boxes of its
     /// objects and twice its radius. If one of them is a point without a radius, the other's size counts; for two such
     /// points, the default is 1e-6.
@@ -129,7 +129,7 @@ impl Querier {
     ///
     /// The answer is certain: [`MotionAnswer::Free`] holds at every moment, not only at samples, and a
     /// [`MotionAnswer::Hit`] names a pose in which the meshes are within the clearance. Contact at time 0 counts.
-    /// Answers have the same bits on every backend and in any order of questions. As for [`Querier::collide`], meshes
+    /// Answers have the same bits on every backend and in any order of queries. As for [`Querier::collide`], meshes
     /// are surfaces, unless they are solid ([`Shape::solid`]): a pose in which a part of one shape is inside the other then is
     /// a hit.
     ///

@@ -8,11 +8,11 @@ use crate::pose::Pose;
 use crate::pose::frames::{inverse, turn};
 use bvh_format::object::Object;
 
-/// A shape and its pose, for questions about points, rays and segments that are given in the world.
+/// A shape and its pose, for queries about points, rays and segments that are given in the world.
 ///
 /// A `&Bvh` or a [`Shape`] converts into the shape in its own frame. [`Shape::at`] places it by a pose, and probes are
-/// then given in the world. The question is then about the stored vertices as [`Pose::place`] places them, as in
-/// questions about pairs of meshes.
+/// then given in the world. The query is then about the stored vertices as [`Pose::place`] places them, as in
+/// queries about pairs of meshes.
 ///
 /// ```
 /// use bvh_query::{PlacedShape, Pose, Querier, Side};

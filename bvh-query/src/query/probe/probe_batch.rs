@@ -73,7 +73,7 @@ impl<'a> ProbeBatch<'a> {
         self.pool.budget = visits;
     }
 
-    /// Stops each question when the flag is set, as [`Querier::set_stop`] does. The question then ends with
+    /// Stops each query when the flag is set, as [`Querier::set_stop`] does. The query then ends with
     /// [`QueryError::Stopped`], and has no answer for any probe.
     pub fn set_stop(&mut self, stop: Option<Arc<dyn Stop>>) {
         self.pool.stop = stop;

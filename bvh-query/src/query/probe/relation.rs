@@ -42,7 +42,7 @@ impl Querier {
     /// Returns the relation of two meshes, with B placed by a pose in A's frame: whether they touch and, if not,
     /// whether one is inside the other.
     ///
-    /// [`Querier::collide`] is about surfaces, so a mesh inside another does not collide with it. This question finds
+    /// [`Querier::collide`] is about surfaces, so a mesh inside another does not collide with it. This query finds
     /// such a mesh. If no triangles touch, each connected component of a mesh is wholly on one side of the other mesh,
     /// and one point of the component tells which. The answer is exact and has the same bits on all backends.
     ///
@@ -69,7 +69,7 @@ impl Querier {
     /// ```
     ///
     /// # Errors
-    /// [`QueryError::NoTopology`] if a file that this question needs was baked without topology;
+    /// [`QueryError::NoTopology`] if a file that this query needs was baked without topology;
     /// [`QueryError::Damaged`] if a page that the query touches is damaged; [`QueryError::Budget`] if the budget does
     /// not suffice.
     pub fn relation<'a, 'b>(

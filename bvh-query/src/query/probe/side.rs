@@ -103,7 +103,7 @@ impl Querier {
 
     /// Returns the closest point of a mesh to `point`, and the side that `point` is on. Returns `None` if the mesh is
     /// farther away than `within`. The signed distance is that of the surface, negative inside. These are two
-    /// questions, and each has the whole budget.
+    /// queries, and each has the whole budget.
     ///
     /// The surface is all triangles of the mesh. Where closed parts of it overlap, or one lies within another, the closest
     /// triangle may be inside the mesh: the distance is then less than that to the outside. Unite the parts before baking
