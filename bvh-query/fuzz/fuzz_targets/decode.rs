@@ -2,9 +2,9 @@
 
 use bvh_format::Layout;
 use bvh_format::bounds::{Subtree, check_bounds};
-use bvh_format::page::decode::decode_child;
 use bvh_format::ids::decode_id;
 use bvh_format::leaf::{VertexBlock, decode_packet};
+use bvh_format::page::decode::decode_child;
 use bvh_format::page::{Page, check_crossing, check_page};
 use bvh_format::turning::decode_turning;
 use bvh_format::validate::{packets, validate};

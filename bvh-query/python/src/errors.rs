@@ -49,9 +49,7 @@ pub(crate) fn question_error(error: &QueryError, message: String) -> PyErr {
     match error {
         QueryError::Damaged(_) => FormatError::new_err(message),
         QueryError::File { .. } => PyOSError::new_err(message),
-        QueryError::Stopped => {
-            StoppedError::new_err("expected time for an answer, found the query stopped")
-        }
+        QueryError::Stopped => StoppedError::new_err("expected time for an answer, found the query stopped"),
         _ => PyValueError::new_err(message),
     }
 }
