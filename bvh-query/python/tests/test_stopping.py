@@ -95,6 +95,8 @@ class Stopping(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.questions = Questions()
+        # Python has this handler unless whoever started it ignores Ctrl-C, as shells do for what runs in the background.
+        cls.addClassCleanup(signal.signal, signal.SIGINT, signal.signal(signal.SIGINT, signal.default_int_handler))
 
     def test_a_question_that_is_stopped_does_not_begin(self):
         for parallel in (False, True):
