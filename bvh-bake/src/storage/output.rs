@@ -18,6 +18,7 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
@@ -32,6 +33,8 @@ pub(crate) enum Output {
 
 /// A new file that gets its name when it is complete.
 pub(crate) struct OutputFile {
+    /// Before `file`, which removes what has not got its final name.
+    writer: Option<Writer>,
     file: Temporary,
     /// The final name.
     path: PathBuf,
@@ -39,7 +42,6 @@ pub(crate) struct OutputFile {
     progress: Progress,
     /// The bytes, or `None` if they do not stay in memory.
     kept: Option<Pieces>,
-    writer: Option<Writer>,
 }
 
 impl Output {
@@ -51,7 +53,7 @@ impl Output {
     /// Creates a file beside `path` whose bytes are read back from the system. Bytes written and read are counted.
     pub(crate) fn beside(path: &Path, progress: &Progress) -> Result<Self, BakeError> {
         let (file, path, progress) = (Temporary::beside(path)?, path.to_owned(), progress.clone());
-        Ok(Self::File(OutputFile { file, path, length: 0, progress, kept: None, writer: None }))
+        Ok(Self::File(OutputFile { writer: None, file, path, length: 0, progress, kept: None }))
     }
 
     /// Creates a file beside `path` whose bytes stay in memory until they are proved. Bytes written are counted.
@@ -113,7 +115,7 @@ impl Output {
                 }
                 file.write(0, bytes)?;
                 file.start_writer()?;
-                file.writer = file.writer.take().map(Writer::closed);
+                file.writer.iter_mut().for_each(Writer::close);
             }
         }
         Ok(())
@@ -174,20 +176,25 @@ impl OutputFile {
     }
 }
 
-/// A thread that writes to a file and then waits for the medium.
+/// A thread that writes to a file and then waits for the medium. If it is dropped before it has finished, nobody needs the file.
 struct Writer {
     /// Bytes and their offset, or `None` after the last bytes.
     sender: Option<Sender<(u64, Arc<Vec<u8>>)>>,
-    thread: JoinHandle<io::Result<()>>,
+    /// `None` once it has been waited for.
+    thread: Option<JoinHandle<io::Result<()>>>,
+    is_dropped: Arc<AtomicBool>,
 }
 
 impl Writer {
     fn start(file: &File, progress: &Progress) -> io::Result<Self> {
         let (file, progress) = (file.try_clone()?, progress.clone());
         let (sender, receiver) = channel();
-        let write = move || write_all(&file, receiver, &progress);
-        let thread = thread::Builder::new().name("output".into()).spawn(write)?;
-        Ok(Self { sender: Some(sender), thread })
+        let is_dropped = Arc::new(AtomicBool::new(false));
+        let thread = thread::Builder::new().name("output".into()).spawn({
+            let is_dropped = is_dropped.clone();
+            move || write_all(&file, receiver, &progress, &is_dropped)
+        })?;
+        Ok(Self { sender: Some(sender), thread: Some(thread), is_dropped })
     }
 
     /// Passes bytes to the thread. If it has ended, `finish` returns the reason.
@@ -198,24 +205,47 @@ impl Writer {
     }
 
     /// Tells the thread that there are no more bytes.
-    fn closed(self) -> Self {
-        Self { sender: None, ..self }
+    fn close(&mut self) {
+        self.sender = None;
     }
 
     /// Waits until all is written and on the medium.
-    fn finish(self) -> io::Result<()> {
-        let Self { sender, thread } = self;
-        drop(sender);
+    fn finish(mut self) -> io::Result<()> {
+        self.close();
+        self.join()
+    }
+
+    fn join(&mut self) -> io::Result<()> {
+        let Some(thread) = self.thread.take() else { return Ok(()) };
         thread.join().unwrap_or_else(|_| Err(io::Error::other("the thread that writes has failed")))
     }
 }
 
-fn write_all(file: &File, receiver: Receiver<(u64, Arc<Vec<u8>>)>, progress: &Progress) -> io::Result<()> {
+impl Drop for Writer {
+    fn drop(&mut self) {
+        self.is_dropped.store(true, Ordering::Relaxed);
+        self.close();
+        // Windows may keep the name of a removed file until nobody has it open. Elsewhere nobody waits for the medium.
+        if cfg!(windows) {
+            let _ = self.join();
+        }
+    }
+}
+
+fn write_all(
+    file: &File,
+    receiver: Receiver<(u64, Arc<Vec<u8>>)>,
+    progress: &Progress,
+    is_dropped: &AtomicBool,
+) -> io::Result<()> {
     for (at, bytes) in receiver {
         progress.go_on_with_io()?;
+        if is_dropped.load(Ordering::Relaxed) {
+            return Ok(());
+        }
         write_all_at(file, &bytes, at)?;
     }
-    file.sync_data()
+    if is_dropped.load(Ordering::Relaxed) { Ok(()) } else { file.sync_data() }
 }
 
 /// Bytes in memory, piece by piece.
