@@ -82,7 +82,7 @@ class Documents(unittest.TestCase):
     def test_programs_of_tasks_are_short_and_listed(self):
         listed = {suffix: check.task_programs(suffix) for suffix in (".py", ".rs")}
         self.assertEqual(set(listed[".py"]), set((pages.ROOT / "bvh-query/python/examples/tasks").glob("*.py")))
-        self.assertLessEqual(set((pages.ROOT / "bvh-query/cbvh/examples").glob("*.rs")), {*listed[".rs"], pages.ROOT / "bvh-query/cbvh/examples/start.rs"})
+        self.assertLessEqual(set((pages.ROOT / "bvh-query/cbvh/examples").glob("*.rs")), {*listed[".rs"], *(pages.ROOT / f"bvh-query/cbvh/examples/{name}.rs" for name in ("start", "from_parry"))})
         for path in [*listed[".py"], *listed[".rs"]]:
             with self.subTest(path=path.name):
                 _, program = re.split(r'\n"""\n|^#!\[allow.*\n', path.read_text(encoding="utf-8"), maxsplit=1, flags=re.M)

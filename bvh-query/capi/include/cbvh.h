@@ -14,7 +14,7 @@
  *
  * Errors. Every function except cbvh_last_message returns a cbvh_status. Any status except CBVH_OK leaves a message for
  * the thread, which names the argument, what was expected and what was found. Arguments are checked before any query
- * is asked. After a failure, handles that a function should have made are 0, and answers have no particular values;
+ * runs. After a failure, handles that a function should have made are 0, and answers have no particular values;
  * nothing is ever written beyond them. Nothing unwinds out of a function. No argument makes a function crash if two
  * conditions hold: pointers that are neither null nor misaligned lead to as many elements as stated, and text ends with
  * a zero byte. If memory for arrays of the caller or for a list of contacts runs out, the status is CBVH_LIMIT. If it
@@ -40,7 +40,7 @@
  * Answers have the same bits on every CPU, on any number of threads and in any order of queries, and are those of the
  * command cbvh and of the Rust library. They do not depend on how the calling thread rounds (fesetround), whether it
  * flushes subnormal numbers (-ffast-math) and which exceptions trap (feenableexcept): functions change this state if
- * they have to, and restore it. Functions of the caller run in the floating-point state of the thread that asked the
+ * they have to, and restore it. Functions of the caller run in the floating-point state of the thread that called the
  * query, except for long double on x86-64 on threads of the library.
  *
  * Lists. A function with a list of answers takes a buffer, the number of elements for which it has room, and a count.
@@ -119,7 +119,7 @@ cbvh_status cbvh_abi(uint32_t *abi);
 
 /* A baked mesh: all objects of a file, or one of them. It may have a radius, and may be solid. */
 typedef struct cbvh_mesh { uint64_t id; } cbvh_mesh;
-/* A querier answers questions. It keeps its working memory from question to question. */
+/* A querier runs queries. It keeps its working memory from query to query. */
 typedef struct cbvh_querier { uint64_t id; } cbvh_querier;
 /* A tracker keeps results from pose to pose of a mesh that moves in small steps. */
 typedef struct cbvh_tracker { uint64_t id; } cbvh_tracker;
@@ -129,7 +129,7 @@ typedef struct cbvh_path { uint64_t id; } cbvh_path;
 typedef struct cbvh_scene { uint64_t id; } cbvh_scene;
 /* A robot among obstacles. */
 typedef struct cbvh_robot { uint64_t id; } cbvh_robot;
-/* A flag that stops questions and bakes. */
+/* A flag that stops queries and bakes. */
 typedef struct cbvh_stop { uint64_t id; } cbvh_stop;
 
 /* ----------------------------------------------------------------------------------------------------------- poses */
@@ -152,7 +152,7 @@ cbvh_status cbvh_pose_inverse(const cbvh_pose *pose, cbvh_pose *result);
 /* Makes the pose that applies `first` and then `next`. For example, a part's pose in a body and then the body's pose in
  * the world make the part's pose in the world. */
 cbvh_status cbvh_pose_then(const cbvh_pose *first, const cbvh_pose *next, cbvh_pose *result);
-/* Makes the pose of B in A's frame, which questions about two meshes take, from the poses of both in the world. */
+/* Makes the pose of B in A's frame, which queries about two meshes take, from the poses of both in the world. */
 cbvh_status cbvh_pose_relative(const cbvh_pose *world_a, const cbvh_pose *world_b, cbvh_pose *result);
 
 /* ---------------------------------------------------------------------------------------------------------- meshes */
@@ -160,11 +160,11 @@ cbvh_status cbvh_pose_relative(const cbvh_pose *world_a, const cbvh_pose *world_
 /* How a file is opened. */
 typedef int32_t cbvh_open_mode;
 enum {
-    /* Maps the file. It takes microseconds, whatever its size, and pages are read when a question needs them. The bytes
+    /* Maps the file. It takes microseconds, whatever its size, and pages are read when a query needs them. The bytes
      * of the file must not change while it is open: replace a file by renaming another one over it. A file that is
      * truncated while it is mapped ends the process with SIGBUS. */
     CBVH_MAP = 0,
-    /* Maps the file, and reads from the disk no more than questions need: for files larger than memory. */
+    /* Maps the file, and reads from the disk no more than queries need: for files larger than memory. */
     CBVH_MAP_SPARSE = 1,
     /* Maps the file, and reads all of it in the background. */
     CBVH_MAP_WHOLE = 2,
@@ -180,7 +180,7 @@ cbvh_status cbvh_mesh_open(const char *path, cbvh_open_mode mode, cbvh_mesh *mes
 cbvh_status cbvh_mesh_from_bytes(const void *bytes, size_t size, cbvh_mesh *mesh);
 /* Opens the bytes of a .cbvh file in place, at any address. They must stay there unchanged until `release` is called
  * with `user`. This happens once, on any thread, when nothing uses the bytes any more: the handle, its clones and
- * objects and scenes with them are freed, and queriers that used them are freed or were asked about something else. It
+ * objects and scenes with them are freed, and queriers that used them are freed or ran other queries. It
  * may happen during this call, because large files are copied to large memory pages. Without `release`, the bytes must
  * stay as long as the process. After a failure, `release` is not called. `release` must not throw an exception and must
  * not call this library. */
@@ -274,7 +274,7 @@ typedef struct cbvh_open_edge {
     uint32_t reserved;
 } cbvh_open_edge;
 
-/* Writes how many edges leave the mesh open, so that questions about what is inside have no answer; none if it is closed.
+/* Writes how many edges leave the mesh open, so that queries about what is inside have no answer; none if it is closed.
  * Duplicates count with their orientation. It takes about a third of a second per million triangles of an open mesh at the
  * first call. CBVH_INVALID_ARGUMENT for a file that was baked without topology. */
 cbvh_status cbvh_mesh_open_edge_counts(cbvh_mesh mesh, cbvh_open_edge_counts *counts);
@@ -308,7 +308,7 @@ typedef struct cbvh_bake_options {
     int32_t scene;
     /* Leaves out the numbers of the triangles in the input. */
     int32_t no_ids;
-    /* Leaves out the topology, which questions about what is inside a mesh need. */
+    /* Leaves out the topology, which queries about what is inside a mesh need. */
     int32_t no_topology;
     /* Bakes even if the output is up to date. Files only. */
     int32_t force;
@@ -399,7 +399,7 @@ cbvh_status cbvh_bake_convex_hull(const double *points, size_t count, cbvh_mesh 
 
 /* -------------------------------------------------------------------------------------------------------- queriers */
 
-/* Which instructions questions use. Answers do not depend on it. */
+/* Which instructions queries use. Answers do not depend on it. */
 typedef int32_t cbvh_backend;
 enum {
     /* The fastest one of this CPU, or the one that the environment variable CBVH_ISA names. */
@@ -415,10 +415,10 @@ enum {
 cbvh_status cbvh_querier_new(cbvh_backend backend, cbvh_querier *querier);
 /* Frees a querier. CBVH_BUSY while it is in use. */
 cbvh_status cbvh_querier_free(cbvh_querier querier);
-/* Lets questions about many poses, paths or probes use all cores (1), or only the calling thread (0, the default).
+/* Lets queries about many poses, paths or probes use all cores (1), or only the calling thread (0, the default).
  * Answers are the same. Give the poses of a path in the order of the path, because neighbours share results. */
 cbvh_status cbvh_querier_set_parallel(cbvh_querier querier, int32_t parallel);
-/* Limits the question about each pose, path or probe to this many visits, of some 100 ns each. A question that needs
+/* Limits the query about each pose, path or probe to this many visits, of some 100 ns each. A query that needs
  * more ends with CBVH_LIMIT. A visit is a pair of objects or of nodes; a node, for a probe; a contact, and each of its
  * duplicates; a component and an object, for a relation; or an interval of a motion. Without a budget, only the sizes
  * of the files limit a query. */
@@ -430,11 +430,11 @@ cbvh_status cbvh_querier_set_budget(cbvh_querier querier, uint64_t visits);
 cbvh_status cbvh_stop_new(cbvh_stop *stop);
 /* Sets a flag, on any thread, but not in a signal handler. */
 cbvh_status cbvh_stop_set(cbvh_stop stop);
-/* Limits questions and bakes in time: the flag counts as set from so many seconds after this call on. At least 0, which sets
+/* Limits queries and bakes in time: the flag counts as set from so many seconds after this call on. At least 0, which sets
  * it at once; infinity is no limit. A later call replaces the time, and a flag that cbvh_stop_set has set stays set. Each
  * query then reads the clock, which takes some 40 nanoseconds. */
 cbvh_status cbvh_stop_set_after(cbvh_stop stop, double seconds);
-/* Clears a flag, and takes its time away. Questions that begin afterwards are answered. */
+/* Clears a flag, and takes its time away. Queries that begin afterwards are answered. */
 cbvh_status cbvh_stop_clear(cbvh_stop stop);
 /* Frees the handle of a flag. Queriers, scenes and robots keep the flag that they were given, set or not. */
 cbvh_status cbvh_stop_free(cbvh_stop stop);
@@ -442,7 +442,7 @@ cbvh_status cbvh_stop_free(cbvh_stop stop);
  * duplicates or of the topology of a file, and the boxes that an open file gets for its rays, are not stopped. */
 cbvh_status cbvh_querier_set_stop(cbvh_querier querier, cbvh_stop stop);
 
-/* The work of the last question. */
+/* The work of the last query. */
 typedef struct cbvh_stats {
     /* Tests of up to 16 pairs of nodes each. */
     uint64_t node_tests;
@@ -450,14 +450,14 @@ typedef struct cbvh_stats {
     uint64_t packet_tests;
     /* Pairs of triangles that went to exact arithmetic. */
     uint64_t exact_tests;
-    /* Pairs of instances asked about; 1 for a querier. */
+    /* Pairs of instances that were tested; 1 for a querier. */
     uint64_t pairs;
 } cbvh_stats;
 
-/* Writes how much work the last pose, path or probe of the last question took. Work on other cores is not counted. */
+/* Writes how much work the last pose, path or probe of the last query took. Work on other cores is not counted. */
 cbvh_status cbvh_querier_stats(cbvh_querier querier, cbvh_stats *stats);
 
-/* --------------------------------------------------------------------------------------- questions about two meshes
+/* --------------------------------------------------------------------------------------- queries about two meshes
  *
  * Each function takes `count` poses of B in A's frame, and writes as many answers. Meshes are surfaces unless they are
  * solid. Touching is contact, exactly. The functions fail with CBVH_DAMAGED if a page that a query touches is
@@ -922,7 +922,7 @@ cbvh_status cbvh_path_screw(const cbvh_pose *start, const double *point, const d
 /* Makes the path through at least two poses. The motion from each pose to the next takes the same share of the time. */
 cbvh_status cbvh_path_polyline(const cbvh_pose *poses, size_t count, cbvh_path *path);
 
-/* Writes where B is at a time from 0 to 1, and returns 0. Any other number is a failure, which the question reports.
+/* Writes where B is at a time from 0 to 1, and returns 0. Any other number is a failure, which the query reports.
  * The same time must always give the same pose, to the bit. */
 typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
 /* Returns an upper bound of the sagitta. Take any point that moves with B and is at most `radius` from B's origin.
@@ -931,7 +931,7 @@ typedef int32_t (*cbvh_pose_function)(void *user, double t, cbvh_pose *pose);
  * acceleration times the square of the time. The bound must hold with all rounding; answers are only as certain as it
  * is. It may be infinite; NaN and negative numbers end the query with CBVH_CALLBACK_FAILED. */
 typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, double t1);
-/* Makes a path of two functions, which are called with `user` while questions run: on the calling thread alone, or on
+/* Makes a path of two functions, which are called with `user` while queries run: on the calling thread alone, or on
  * several threads at the same time if the querier or scene is parallel. They must not leave by an exception or longjmp.
  * They may call this library, but with the querier in use they get CBVH_BUSY. A query that they run on a
  * thread of the library uses that thread only. `release` is called with `user` when the path is no longer used: once,
@@ -939,7 +939,7 @@ typedef double (*cbvh_sagitta_function)(void *user, double radius, double t0, do
  * exception and must not call this library. After a failure it is not called. */
 cbvh_status cbvh_path_from_functions(cbvh_pose_function pose, cbvh_sagitta_function sagitta,
                                      void (*release)(void *user), void *user, cbvh_path *path);
-/* States why a function of a path is about to fail. Call it in that function; the message of the question then ends
+/* States why a function of a path is about to fail. Call it in that function; the message of the query then ends
  * with this text. */
 cbvh_status cbvh_callback_message(const char *message);
 /* Frees a path. */
@@ -1052,7 +1052,7 @@ cbvh_status cbvh_closest_points(cbvh_querier querier, cbvh_mesh mesh, const cbvh
  * than the radius, or inside them. */
 cbvh_status cbvh_sides(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points, size_t count,
                        cbvh_side *answers);
-/* Answers both questions. The surface is all triangles of the mesh: where closed parts of it overlap, or one lies within
+/* Both of the above. The surface is all triangles of the mesh: where closed parts of it overlap, or one lies within
  * another, the closest triangle may be inside the mesh, and the distance is less than that to the outside. */
 cbvh_status cbvh_signed_point_distances(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *pose, const double *points,
                                   size_t count, double within, cbvh_closest_point *answers);
@@ -1118,10 +1118,10 @@ cbvh_status cbvh_visible(cbvh_querier querier, cbvh_mesh mesh, const cbvh_pose *
 /* ---------------------------------------------------------------------------------------------------------- scenes
  *
  * Many placed meshes, and queries over all pairs that may meet. In a pair, A is the instance in the lower place, and
- * answers are in A's frame. Threads may ask about a scene while others change it: each query is about the scene as it
+ * answers are in A's frame. Threads may query a scene while others change it: each query is about the scene as it
  * is when the query begins. The first change during a query copies the tables of the scene (2 us for 60 instances,
  * 0.3 ms for 10,000), and no mesh. A query may see one of two calls that change the scene and not the other: clone
- * the scene, which takes a microsecond, to change or to ask a copy that nobody else has. */
+ * the scene, which takes a microsecond, to change or to query a copy that nobody else has. */
 
 /* Makes an empty scene. */
 cbvh_status cbvh_scene_new(cbvh_backend backend, cbvh_scene *scene);
@@ -1134,16 +1134,16 @@ cbvh_status cbvh_scene_of_mesh(cbvh_mesh mesh, cbvh_scene *scene);
 cbvh_status cbvh_scene_clone(cbvh_scene scene, cbvh_scene *other);
 /* Frees a scene. */
 cbvh_status cbvh_scene_free(cbvh_scene scene);
-/* Lets questions use all cores (1) or one (0, the default). */
+/* Lets queries use all cores (1) or one (0, the default). */
 cbvh_status cbvh_scene_set_parallel(cbvh_scene scene, int32_t parallel);
 /* Lets the scene reuse earlier results about each pair (1) or not (0, the default). This is faster if instances move
  * little between queries. */
 cbvh_status cbvh_scene_set_tracking(cbvh_scene scene, int32_t tracking);
-/* Limits each question to this many visits over all its pairs, and each probe over all instances. Visits are those of
+/* Limits each query to this many visits over all its pairs, and each probe over all instances. Visits are those of
  * cbvh_querier_set_budget, each comparison of a box with up to sixteen others in the search for near pairs, and each pair
  * of boxes that these leave. If there are several threads, each may make this many before they stop. */
 cbvh_status cbvh_scene_set_budget(cbvh_scene scene, uint64_t visits);
-/* Gives a flag to a scene, as cbvh_querier_set_stop does. Clones share it. Questions that are under way keep the flag that
+/* Gives a flag to a scene, as cbvh_querier_set_stop does. Clones share it. Queries that are under way keep the flag that
  * they began with. */
 cbvh_status cbvh_scene_set_stop(cbvh_scene scene, cbvh_stop stop);
 
@@ -1174,15 +1174,15 @@ cbvh_status cbvh_scene_parent(cbvh_scene scene, cbvh_instance child, cbvh_instan
  * last pose counts; otherwise the order does not matter. */
 cbvh_status cbvh_scene_set_poses(cbvh_scene scene, const cbvh_instance *instances, const cbvh_pose *worlds,
                                  size_t count);
-/* Sets the groups that an instance is in and those that it meets, one bit per group. Questions are about two instances
+/* Sets the groups that an instance is in and those that it meets, one bit per group. Queries are about two instances
  * if each is in a group that the other meets. By default all bits are set. */
 cbvh_status cbvh_scene_set_groups(cbvh_scene scene, cbvh_instance instance, uint32_t member, uint32_t meets);
-/* Allows two instances to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
+/* Allows two instances to touch (1), or forbids it again (0). A pair that may touch takes part in no query. */
 cbvh_status cbvh_scene_set_allowed(cbvh_scene scene, cbvh_instance a, cbvh_instance b, int32_t allowed);
-/* Gives an instance a margin in mesh units from 0 to 2^118, which is added to the radius of its mesh in every question.
+/* Gives an instance a margin in mesh units from 0 to 2^118, which is added to the radius of its mesh in every query.
  * It is 0 at first. CBVH_INVALID_ARGUMENT for a margin that is negative, NaN or above 2^118. */
 cbvh_status cbvh_scene_set_margin(cbvh_scene scene, cbvh_instance instance, double margin);
-/* Gives a pair of instances a margin besides those of both. Questions about the pair add it to the margin of A. It is 0
+/* Gives a pair of instances a margin besides those of both. Queries about the pair add it to the margin of A. It is 0
  * at first, and goes when an instance of the pair is removed. */
 cbvh_status cbvh_scene_set_pair_margin(cbvh_scene scene, cbvh_instance a, cbvh_instance b, double margin);
 /* Writes the instance with a name. CBVH_NOT_FOUND if there is none. */
@@ -1200,7 +1200,7 @@ cbvh_status cbvh_scene_instance_mesh(cbvh_scene scene, cbvh_instance instance, c
 cbvh_status cbvh_scene_instance_margin(cbvh_scene scene, cbvh_instance instance, double *margin);
 /* Writes the margin that a pair of instances has besides those of both, in either order. */
 cbvh_status cbvh_scene_pair_margin(cbvh_scene scene, cbvh_instance a, cbvh_instance b, double *margin);
-/* Writes how much work the question took that ended last, over all its pairs. */
+/* Writes how much work the query took that ended last, over all its pairs. */
 cbvh_status cbvh_scene_stats(cbvh_scene scene, cbvh_stats *stats);
 
 /* A pair of instances. */
@@ -1327,13 +1327,13 @@ cbvh_status cbvh_scene_visible(cbvh_scene scene, const cbvh_segment *segments, s
 
 /* ---------------------------------------------------------------------------------------------------------- robots
  *
- * A robot from a URDF file, obstacles and attached objects, asked about with the values of joints. A body is a link, an
+ * A robot from a URDF file, obstacles and attached objects, in queries by joint values. A body is a link, an
  * obstacle or an attached object. Queries are about all pairs of bodies that can move against each other, except those
  * whose contact is allowed, by cbvh_robot_set_allowed or by the SRDF file. Links that only fixed joints connect are never
- * asked about with each other, and neither are obstacles. The frame of the root link is the world, unless the base moves.
+ * checked with each other, and neither are obstacles. The frame of the root link is the world, unless the base moves.
  * Lengths are in metres, the unit of URDF files, and angles in radians.
  *
- * Functions that change a robot name bodies, and answers number them. Threads may ask about a robot while others change
+ * Functions that change a robot name bodies, and answers number them. Threads may query a robot while others change
  * it, as for scenes.
  *
  * A configuration has `joint_count` numbers, in the order of cbvh_robot_joint_name. Arrays have `count` configurations,
@@ -1364,7 +1364,7 @@ typedef struct cbvh_robot_options {
     const char *cache;
     /* A cylinder becomes a prism that reaches beyond it by at most this part of its radius; 0 for 1/1000. */
     double cylinder_error;
-    /* Asks about the visual shapes of links (1) or their collision shapes (0). */
+    /* Takes the visual shapes of links (1) or their collision shapes (0). */
     int32_t visual;
     cbvh_robot_base base;
     /* Lets the URDF name meshes anywhere (1), or only in the folder above its own and below, in its package, in packages
@@ -1393,7 +1393,7 @@ cbvh_status cbvh_robot_from_urdf(const char *path, const cbvh_robot_options *opt
 cbvh_status cbvh_robot_clone(cbvh_robot robot, cbvh_robot *other);
 /* Frees a robot. */
 cbvh_status cbvh_robot_free(cbvh_robot robot);
-/* Lets questions about many configurations or motions use all cores (1) or one (0, the default). */
+/* Lets queries about many configurations or motions use all cores (1) or one (0, the default). */
 cbvh_status cbvh_robot_set_parallel(cbvh_robot robot, int32_t parallel);
 /* Gives a flag to a robot, as cbvh_scene_set_stop does. */
 cbvh_status cbvh_robot_set_stop(cbvh_robot robot, cbvh_stop stop);
@@ -1454,7 +1454,7 @@ cbvh_status cbvh_robot_body_name(cbvh_robot robot, cbvh_body body, char *buffer,
  * the world. The margin of the body is a part of its radius. This is for queries that robots do not answer, such as
  * cbvh_patches. CBVH_NOT_FOUND if there are no more shapes than `number`. */
 cbvh_status cbvh_robot_shape(cbvh_robot robot, cbvh_body body, size_t number, cbvh_mesh *mesh, cbvh_pose *pose);
-/* Lists the pairs that are asked about. */
+/* Lists the pairs that are checked. */
 cbvh_status cbvh_robot_pairs(cbvh_robot robot, cbvh_body_pair *pairs, size_t capacity, size_t *count);
 
 /* Adds an obstacle, which stands in the world. No other body may have its name. `body` may be NULL. The handle of the
@@ -1479,7 +1479,7 @@ cbvh_status cbvh_robot_set_margin(cbvh_robot robot, const char *name, double mar
 /* Makes a body a solid, also a link: what is inside touches it from now on. CBVH_INVALID_ARGUMENT if a mesh of the body is
  * not closed: see cbvh_mesh_solid. */
 cbvh_status cbvh_robot_make_solid(cbvh_robot robot, const char *name);
-/* Allows two bodies to touch (1), or forbids it again (0). A pair that may touch takes part in no question. */
+/* Allows two bodies to touch (1), or forbids it again (0). A pair that may touch takes part in no query. */
 cbvh_status cbvh_robot_set_allowed(cbvh_robot robot, const char *a, const char *b, int32_t allowed);
 
 /* A pair that touches often. */

@@ -1,7 +1,7 @@
 // cbvh for C++17: handles that free themselves, answers in vectors, failures as exceptions. This header wraps cbvh.h,
 // which documents the queries: shapes, units, costs and threads.
 //
-// Meshes and paths may be shared by threads; make a Querier for each thread. A Scene and a Robot may be asked while others
+// Meshes and paths may be shared by threads; make a Querier for each thread. Queries of a Scene or a Robot may run while others
 // change them. Objects that were moved from hold no handle, and queries about them throw an Error of CBVH_INVALID_HANDLE.
 #ifndef CBVH_HPP
 #define CBVH_HPP
@@ -1232,7 +1232,7 @@ private:
     Owned handle_;
 };
 
-/// Many placed meshes. Threads may ask while others change it: each query is about the scene as it is when the
+/// Many placed meshes. Queries may run while other threads change it: each query is about the scene as it is when the
 /// query begins. Copies share the meshes. If a list of pairs, contacts or hits is longer than 64 and than the last
 /// list, the library asks for it twice, because the first time only counts its elements.
 class Scene {
@@ -1562,7 +1562,7 @@ struct RobotOptions {
     bool apply_up_axis = false;
 };
 
-/// A robot among obstacles, asked about with the values of its joints, which are in the order of joints(). Threads may ask
+/// A robot among obstacles, in queries by the values of its joints, in the order of joints(). Queries may run
 /// while others change it: each query is about the robot as it is when the query begins. Copies share the meshes.
 class Robot {
 public:
@@ -1709,7 +1709,7 @@ public:
             shapes.emplace_back(Mesh(mesh), pose);
         }
     }
-    /// The pairs that are asked about.
+    /// The pairs that are checked.
     std::vector<cbvh_body_pair> pairs() const {
         return detail::list<cbvh_body_pair>([&](cbvh_body_pair *pairs, std::size_t capacity, std::size_t *count) {
             return cbvh_robot_pairs(raw(), pairs, capacity, count);

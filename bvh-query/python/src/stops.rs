@@ -15,8 +15,11 @@ use std::time::{Duration, Instant};
 /// How long questions may run before Python handles signals.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
 
-/// How often a question reads its flag between two looks at the time: some two milliseconds.
-const READS_PER_LOOK: u32 = 64;
+/// How far apart looks at the time should be, and how many reads of a flag there may be between two of them. The next look is
+/// planned by how long reads have taken: from the time of a short question to milliseconds.
+const LOOK: Duration = Duration::from_millis(2);
+const FIRST_READS: u32 = 8;
+const MOST_READS: u32 = 64;
 
 /// A flag, and the time that sets it, too.
 #[derive(Clone)]
@@ -43,13 +46,33 @@ thread_local! {
 
 #[derive(Clone, Copy)]
 struct Watch {
-    reads: u32,
     /// When Python handled signals, or when the time was looked at first.
     handled: Option<Instant>,
+    /// Reads of the flag since then.
+    reads: u32,
+    /// The number of them at which the time is looked at.
+    look_at: u32,
 }
 
 impl Watch {
-    const NEW: Self = Self { reads: 0, handled: None };
+    const NEW: Self = Self { handled: None, reads: 0, look_at: FIRST_READS };
+
+    /// Counts a read, and returns whether Python should handle signals.
+    fn is_due(&mut self) -> bool {
+        self.reads += 1;
+        if self.reads < self.look_at {
+            return false;
+        }
+        let now = Instant::now();
+        let passed = self.handled.map(|handled| now.duration_since(handled));
+        if let Some(passed) = passed.filter(|&passed| passed <= PATIENCE) {
+            let reads = LOOK.as_secs_f64() / passed.as_secs_f64() * f64::from(self.reads);
+            self.look_at = self.reads + (reads as u32).clamp(1, MOST_READS);
+            return false;
+        }
+        *self = Self { handled: Some(now), ..Self::NEW };
+        passed.is_some()
+    }
 }
 
 /// Asks a question on this thread, which ends if a handler of a signal raises an exception.
@@ -72,21 +95,11 @@ fn is_stopped() -> bool {
 
 /// Lets Python handle signals if it is time.
 fn is_interrupted() -> bool {
-    let Watch { reads, handled } = WATCH.get();
-    let reads = reads.wrapping_add(1);
-    let set = |handled| WATCH.set(Watch { reads, handled });
-    set(handled);
-    if reads.is_multiple_of(READS_PER_LOOK) {
-        match handled {
-            None => set(Some(Instant::now())),
-            Some(since) if since.elapsed() > PATIENCE => {
-                if let Err(raised) = Python::attach(|py| py.check_signals()) {
-                    RAISED.set(Some(raised));
-                }
-                set(Some(Instant::now()));
-            }
-            Some(_) => {}
-        }
+    let mut watch = WATCH.get();
+    let is_due = watch.is_due();
+    WATCH.set(watch);
+    if is_due && let Err(raised) = Python::attach(|py| py.check_signals()) {
+        RAISED.set(Some(raised));
     }
     RAISED.with_borrow(Option::is_some)
 }

@@ -63,7 +63,7 @@ impl Robot {
     /// given ([`MotionOptions::tolerance_between`]).
     ///
     /// Each joint moves straight in its value: a continuous joint from 3.0 to -3.0 turns by 6 radians, the long way round. For the
-    /// short way, ask about the goal that [`Robot::nearest_turns`] returns. A body that is inside a mesh all the way without touching
+    /// short way, take the goal that [`Robot::nearest_turns`] returns. A body that is inside a mesh all the way without touching
     /// it is free: see [`Robot::pairs_inside`].
     ///
     /// Cost: balls around the links, at some moments, against each other and against what stands still, until that of

@@ -44,10 +44,10 @@ pub trait RigidPath {
     /// acceleration times the square of `t1 - t0`.
     ///
     /// The bound must hold for all poses that [`RigidPath::pose`] returns, rounding included. Answers are only as
-    /// certain as this bound. The smaller it is for short intervals, the less work a question takes. NaN or a negative
+    /// certain as this bound. The smaller it is for short intervals, the less work a query takes. NaN or a negative
     /// number counts as infinite.
     ///
-    /// Questions call this with a radius of at least 0 and `0 <= t0 <= t1 <= 1`. The paths of this library accept any
+    /// Queries call this with a radius of at least 0 and `0 <= t0 <= t1 <= 1`. The paths of this library accept any
     /// numbers, so that other paths can be built on them. The times may be in any order, as on a path that is reversed.
     /// Before 0 and after 1, these paths stand still. For NaN, the bound is infinite.
     fn sagitta(&self, radius: f64, t0: f64, t1: f64) -> f64;
@@ -56,7 +56,7 @@ pub trait RigidPath {
     /// never falls or never rises, in all poses that [`RigidPath::pose`] returns, to the bit. The sagitta of each part of the interval
     /// must be no larger than that of the whole.
     ///
-    /// Boxes along the axes of A then bound where B is without any rounding. Questions thereby tell flush parts apart that slide
+    /// Boxes along the axes of A then bound where B is without any rounding. Queries thereby tell flush parts apart that slide
     /// along each other across a gap of a few roundings. Otherwise they would look at the pose in the middle of each cell.
     fn slides(&self, _t0: f64, _t1: f64) -> bool {
         false

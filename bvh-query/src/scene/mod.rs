@@ -68,7 +68,7 @@ use workers::Workers;
 /// # Threads
 /// A clone takes 0.03 us, however many instances there are: clones share what the scene holds until one of them changes.
 /// The first change while another clone lives copies the tables, but no shape: see [`Scene::snapshot`]. So some threads
-/// may ask while others change the scene. Each query is about a snapshot, and nobody waits for a query:
+/// may query a scene while others change it. Each query is about a snapshot, and nobody waits for a query:
 ///
 /// ```
 /// use bvh_query::{Pose, Scene};
@@ -367,7 +367,7 @@ impl Scene {
     }
 
     /// Updates what the next query would update first, and returns a clone: the scene as it is now. Queries about
-    /// the clone then change nothing that both share. Take it under a lock, and ask without the lock; changes of this
+    /// the clone then change nothing that both share. Take it under a lock, and query it without the lock; changes of this
     /// scene do not affect it.
     ///
     /// Cost: as for a clone, after the update. While a snapshot lives, the first change of either scene copies the
@@ -516,7 +516,7 @@ impl Scene {
         self.stats
     }
 
-    /// Returns how many times the last query asked about a pair of instances.
+    /// Returns how many times the last query tested a pair of instances.
     pub fn pairs_asked(&self) -> u64 {
         self.pairs_asked
     }

@@ -197,7 +197,7 @@ export enum ClashClass {
     UNDECIDED = 6,
     /** They have points in common, and one is not closed, so that they have no depth. */
     INTERSECTING = 7,
-    /** Their depth exceeds the tolerance, and one passes through the other. If magnitudes are asked for, parts that overlap are this
+    /** Their depth exceeds the tolerance, and one passes through the other. If magnitudes are computed, parts that overlap are this
      * or `PROTRUDING`. */
     PIERCING = 8,
     /** Their depth exceeds the tolerance, and neither passes through the other. */
@@ -260,7 +260,7 @@ export interface Clash {
     /** For parts that touch, overlap or are undecided: the bounds of their depth, both 0 without a common point. Parts that are not
      * closed have none. */
     depth: Penetration | undefined;
-    /** For closed parts that overlap, are undecided, contain each other or are duplicated, if magnitudes were asked for: what they have
+    /** For closed parts that overlap, are undecided, contain each other or are duplicated, if magnitudes were computed: what they have
      * in common. */
     magnitudes: Intersection | undefined;
 }
@@ -276,7 +276,7 @@ export interface Clashes {
     /** Length 3 N. */
     point: Float64Array;
     depth: Penetrations;
-    /** `undefined` unless they were asked for. */
+    /** `undefined` unless they were computed. */
     magnitudes: Intersections | undefined;
 }
 

@@ -30,7 +30,7 @@ itself.
 
 **Scenes** are many placed meshes (`Scene`). `CollisionManager` has trimesh's interface for them.
 
-**Robots** are read from URDF files and asked about with the values of their joints (`Robot`). A body that starts inside a
+**Robots** are read from URDF files, and take the values of their joints (`Robot`). A body that starts inside a
 closed obstacle that is no solid does not touch it, and `InsideWarning` says so.
 
 **Answers** to one query are plain values. Answers to N queries are arrays of N elements or rows, or lists of N
@@ -42,7 +42,7 @@ exactly. Touching is contact, and meshes are surfaces, unless they are made soli
 
 **Seeing.** `Mesh.view` and `Scene.view` make a page that shows meshes, which a notebook shows at once (`View`).
 
-**Threads.** While a query runs, other threads of Python run, and any number of threads may ask at the same time.
+**Threads.** While a query runs, other threads of Python run, and any number of threads may run queries at the same time.
 ``parallel=True`` divides the N queries of one call among all cores; the answers are the same bits. A query is
 about a `Scene` as it is when the query begins, and a path of your own is called on the thread of its query. Arrays
 are copied before a query runs, so changing an array meanwhile does not affect answers. An interpreter without a global lock

@@ -21,7 +21,7 @@ class RobotDistance(NamedTuple):
     """The nearest two bodies, or those of each of N configurations."""
 
     distance: Any
-    """How far apart they are: a number, or an array of shape (N,). Infinite if no pairs are asked about."""
+    """How far apart they are: a number, or an array of shape (N,). Infinite if no pairs are checked."""
     lower: Any
     """A lower bound of the exact distance."""
     upper: Any
@@ -36,10 +36,10 @@ class RobotSignedDistance(NamedTuple):
     """The two bodies with the least signed distance, or those of each of N configurations."""
 
     bodies: Any
-    """Their names, or a list of those. None if no pairs are asked about."""
+    """Their names, or a list of those. None if no pairs are checked."""
     nearest: SignedDistance
     """How far apart they are or, below zero, how deep they overlap: what `Mesh.signed_distance` answers, but with points, normal
-    and translation in the world. If no pairs are asked about, the bounds are infinite, and the other numbers NaN."""
+    and translation in the world. If no pairs are checked, the bounds are infinite, and the other numbers NaN."""
 
 
 class NearPair(NamedTuple):
@@ -109,11 +109,11 @@ class InsideWarning(UserWarning):
 
 
 class Robot:
-    """A robot among obstacles, asked about with the values of its joints.
+    """A robot among obstacles, with queries by the values of its joints.
 
     A body is a link, an obstacle or an attached object. Queries are about all pairs of bodies that can move against each
     other, but for those whose contact is allowed: by `allow`, or by the SRDF. Links that only fixed joints connect, and
-    obstacles among themselves, are never asked about. Links are surfaces, if they are meshes, and primitives are solid.
+    obstacles among themselves, are never checked. Links are surfaces, if they are meshes, and primitives are solid.
 
     An array of joint values ``q`` has shape (n,) for one configuration, or (N, n) for N of them, in the order of `joints`.
     Angles are in radians, lengths in metres. Answers are certain, and the same bits on all systems. ``parallel=True`` divides
@@ -270,7 +270,7 @@ class Robot:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """The pairs of bodies that are asked about."""
+        """The pairs of bodies that are checked."""
         return [(a, b) for a, b in self._robot.pairs()]
 
     def allow(self, a: str, b: str, allowed: bool = True) -> None:

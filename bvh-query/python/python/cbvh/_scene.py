@@ -64,10 +64,10 @@ class Scene:
     frame, to the bit.
 
     **Threads** may share a scene. A query is about the scene as it is when the query begins. Other threads run
-    meanwhile: they may ask, or change poses, margins and meshes, and nobody waits for a query. The first change
+    meanwhile: they may run queries, or change poses, margins and meshes, and nobody waits for a query. The first change
     during a query copies the tables of the scene (2 us for 60 instances, 0.3 ms for 10,000), and no mesh. Changes that
-    belong together can be seen one by one, except those of `set_poses`: to ask about all or none of them, make them in a
-    `copy`, and let other threads ask that one. A copy takes a microsecond.
+    belong together can be seen one by one, except those of `set_poses`: to query all or none of them, make them in a
+    `copy`, and let other threads query that one. A copy takes a microsecond.
     Pickling keeps instances, numbers, names, poses, groups, margins, attachments and allowed pairs. Each mesh is pickled
     once, as by itself.
     An instance that is added later may have another place in the order than in the scene that was pickled.
@@ -475,7 +475,7 @@ class Scene:
         return parts
 
     def _asked(self) -> NDArray[np.int64]:
-        """All pairs that are asked about, in their order, shape (K, 2)."""
+        """All pairs that are checked, in their order, shape (K, 2)."""
         numbers = self._scene.ids()
         groups = np.array([self._scene.groups(number) for number in numbers.tolist()], np.int64).reshape(-1, 2)
         allowed = {(min(pair), max(pair)) for pair in self.allowed().tolist()}

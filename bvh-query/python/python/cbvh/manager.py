@@ -7,7 +7,7 @@ It uses `Scene` and needs neither trimesh nor FCL. It differs in the following:
   it, unless that is a primitive of trimesh, which is solid, or has ``solid=True``.
 - ``Sphere`` and ``Capsule`` of ``trimesh.primitives`` are exact, and have the one triangle 0. ``Box`` has the triangles of
   trimesh. ``Cylinder`` is a polyhedron around it, 0.002 of the radius larger, and not one inside it. An ``Extrusion`` is a
-  mesh. Their transforms must be rigid. A primitive counts as it is when it is added or asked about.
+  mesh. Their transforms must be rigid. A primitive counts as it is when it is added or queried.
 - A ``PointCloud`` is its points, and answers name their numbers. ``radius``, here and for any mesh, is added on all sides.
 - Contact is exact. Contacts are all pairs of triangles that touch, each once, with the number of a triangle of each object;
   FCL finds one contact of two convex meshes, without these numbers. The points are where the two triangles meet.

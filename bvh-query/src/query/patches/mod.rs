@@ -85,7 +85,7 @@ pub struct Patches {
     pub patches: Vec<Patch>,
     /// The contacts of the first patch, of the second one, and so on, in ascending order within each.
     pub regions: Vec<ContactRegion>,
-    /// The contact points of the first patch, of the second one, and so on; none unless [`PatchOptions::max_points`] asks for some.
+    /// The contact points of the first patch, of the second one, and so on; none unless [`PatchOptions::max_points`] is above 0.
     pub points: Vec<PatchPoint>,
     /// The number of all contacts.
     pub total: u64,

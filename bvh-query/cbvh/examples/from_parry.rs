@@ -6,8 +6,8 @@
 #![allow(clippy::print_stdout, reason = "a program prints its results")]
 
 // ANCHOR: program
-use bvh_bake::{Options, mesh::Mesh, to_bytes};
-use bvh_query::{Bvh, Pose, Querier, Ray, Side};
+use cbvh::bake::{Options, mesh::Mesh, to_bytes};
+use cbvh::{Bvh, Pose, Querier, Ray, Side};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
