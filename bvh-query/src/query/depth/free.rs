@@ -80,6 +80,9 @@ const LEAST_RATE: f64 = 1.0 / 16.0;
 /// The part of the size by which a common point has to bring a way on.
 const LEAST_PART: f64 = 2e-7;
 
+/// The most times that common points bring a way on: a small ball that slides along a face comes on by its radius each time.
+const MOST_COMMON_WAYS: u32 = 1024;
+
 impl Translation<'_> {
     /// Returns the last of the contacts that were found at a place.
     fn last_contact(&self, at: f64, leaving: &Leaving) -> Option<LastContact> {
@@ -155,14 +158,15 @@ impl Querier {
             Search::Rough | Search::Near(_) if limit > MANY_TRIANGLES * line.grain => line.grain / 4.0,
             _ => 0.0,
         };
-        let mut least = 0.0;
+        let (mut least, mut common_ways) = (0.0, 0);
         while at < limit && at <= line.length {
             while step > least && at < limit {
                 if self.relation_of(line.a, line.b, &line.pose_at(at + step))? == Relation::Apart {
                     if let Some(free) = self.tightened(line, from, at + step)? {
                         return Ok(Some(free));
                     }
-                    (step, least) = (step / FEW_CROSSINGS, line.grain);
+                    // Beside radii, triangles may be smaller than what a place is rounded by.
+                    (step, least) = (step / FEW_CROSSINGS, line.grain.max(line.placing));
                 } else if at == from && matches!(search, Search::Near(_)) && line.is_fine {
                     // The guess was too short, but hardly so.
                     (at, step) = (at + step, step / 16.0);
@@ -197,8 +201,9 @@ impl Querier {
                     return Ok(Some(Free { at: place, last }));
                 }
             }
-            let way = self.common_way(line, at, touches)?;
+            let way = if common_ways < MOST_COMMON_WAYS { self.common_way(line, at, touches)? } else { 0.0 };
             (at, stuck) = if way > 0.0 {
+                common_ways += 1;
                 (at + way, 1.0)
             } else {
                 (until + STEPS[STEPS.len() - 1] * stuck * line.placing, 4.0 * stuck)
@@ -209,12 +214,13 @@ impl Querier {
 
     /// Returns how far interiors meet without a gap, up to the end of a way.
     pub(super) fn cover(&mut self, line: &Translation<'_>, end: f64) -> Result<f64, QueryError> {
-        let mut covered = 0.0;
-        while covered < end {
+        let (mut covered, mut common_ways) = (0.0, 0);
+        while covered < end && common_ways < MOST_COMMON_WAYS {
             let leaving = self.leaving(line, covered)?;
             let way = if leaving.crosses_until > line.placing {
                 leaving.crosses_until
             } else {
+                common_ways += 1;
                 self.common_way(line, covered, leaving.touches_until.is_some())?
             };
             if way <= 0.0 {

@@ -380,6 +380,10 @@ impl<'a> DepthSearch<'a> {
             planes.push(Plane { normal: last.normal, height: free.at * dot(last.normal, direction) });
             let Some(shortest) = shortest_beyond(&planes) else { break };
             let way = length(shortest);
+            // B is beyond all of them where it is, but for roundings.
+            if way == 0.0 {
+                break;
+            }
             let next = shortest.map(|x| x / way);
             if way >= (1.0 - LEAST_GAIN) * self.best || dot(next, direction) > 1.0 - 1e-9 {
                 break;

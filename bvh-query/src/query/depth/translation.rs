@@ -66,6 +66,7 @@ impl<'a> Translation<'a> {
     }
 
     pub(super) fn along(self, direction: Point) -> Self {
+        debug_assert!(direction.iter().all(|x| x.is_finite()), "a direction has a length");
         Self { direction, ..self }
     }
 

@@ -3,8 +3,10 @@
 use super::penetration;
 use crate::common::shapes::{cube, moved as at, outward, plate, sphere};
 use crate::common::{Random, bake, baked, mesh, queriers, random_pose, translation};
-use bvh_bake::Options;
+use bvh_bake::mesh::Mesh;
+use bvh_bake::{Options, shapes};
 use bvh_query::{Bvh, PenetrationOptions, Querier, QueryError, Relation, Shape};
+use cbvh_testkit::depth::rounds;
 
 /// A box with its centre at the origin.
 fn block(half: [f64; 3]) -> Bvh {
@@ -141,6 +143,86 @@ fn balls_and_capsules_are_as_deep_as_their_radii_say() {
             assert_eq!(querier.relation(a, b, &moved).unwrap(), Relation::Apart);
         }
     }
+}
+
+/// Radii far smaller and far larger than anything else: a ball that slides along a face, and capsules whose cores are less than what a
+/// place is rounded by.
+#[test]
+fn searches_end_whatever_the_radii() {
+    let (block, point) = (block([0.25, 1.0, 0.75]), baked(&[[[0.0; 3]; 3]]));
+    let segments = [2.0, 1.0].map(|length| {
+        bake(&shapes::segment([0.0, 0.0, -length / 2.0], [0.0, 0.0, length / 2.0]), &Options::default())
+    });
+    for querier in &mut queriers() {
+        for radius in [1e-3, 1e-5, 1e-6] {
+            let ball = point.all().rounded(radius).unwrap();
+            let found = querier
+                .separation(block.all(), ball, &translation(0.25, 0.0, 0.0), [0.0, 0.0, -1.0])
+                .unwrap();
+            let expected = 0.75 + radius;
+            assert!(found.lower <= expected + 1e-12 && expected <= found.upper + 1e-12, "{found:?}");
+            assert!(found.upper < expected + 1e-9, "{found:?}");
+        }
+        for radius in [1e16, 1e18, 2f64.powi(100), 2f64.powi(117)] {
+            let [small, large] = [(0, 0.5), (1, radius)].map(|(n, r)| segments[n].all().rounded(r).unwrap());
+            let found = querier
+                .penetration(small, large, &translation(1.0, 0.25, 0.0), &PenetrationOptions::new())
+                .unwrap();
+            assert!(
+                found.lower <= radius * (1.0 + 1e-9) && radius * (1.0 - 1e-9) <= found.upper,
+                "{found:?}"
+            );
+        }
+    }
+}
+
+/// Points, segments, boxes and prisms with and without radii, on a grid on which many only just touch: at an edge, a corner, or where a
+/// point is on a surface.
+#[test]
+fn shapes_on_a_grid_have_depths_where_they_only_touch() {
+    let (mut queriers, mut random) = (queriers(), Random::new(62));
+    let options = PenetrationOptions::new();
+    let core = |mesh: Mesh| bake(&mesh, &Options::default());
+    let cores = [
+        core(shapes::point([0.0; 3])),
+        core(shapes::cloud(&[[1.0, 0.5, 0.0], [-1.0, -1.0, -1.0], [0.0, 0.5, 1.0]])),
+        core(shapes::segment([0.0, 0.0, -0.5], [0.0, 0.0, 0.5])),
+        core(shapes::block([1.0; 3]).unwrap()),
+        core(shapes::block([0.5, 2.0, 1.5]).unwrap()),
+        core(shapes::cylinder(0.5, 1.0, 0.001).unwrap().mesh),
+    ];
+    let radii = [0.0, 0.25, 0.5, 1.0];
+    let mut touching = 0;
+    for _ in 0..rounds(600) {
+        let [a, b] = [(); 2].map(|()| {
+            let core = &cores[random.below(cores.len())];
+            (core, core.all().rounded(radii[random.below(radii.len())]).unwrap())
+        });
+        let at = [(); 3].map(|()| random.below(17) as f64 / 4.0 - 2.0);
+        let pose = translation(at[0], at[1], at[2]);
+        let what = format!("{:?} and {:?} at {at:?}", a.1, b.1);
+        let first = queriers[0].signed_distance(a.1, b.1, &pose, &options).expect(&what);
+        let gap = queriers[0].distance(a.0, b.0, &pose).unwrap().distance - a.1.radius() - b.1.radius();
+        let relation = queriers[0].relation(a.1, b.1, &pose).unwrap();
+        assert_eq!(first.lower > 0.0, relation == Relation::Apart, "{first:?}: {what}");
+        for querier in &mut queriers {
+            assert_eq!(querier.signed_distance(a.1, b.1, &pose, &options).as_ref(), Ok(&first), "{what}");
+            let found = querier.penetration(a.1, b.1, &pose, &options).expect(&what);
+            assert!(
+                0.0 <= found.lower && found.lower <= found.upper && found.upper < 20.0,
+                "{found:?}: {what}"
+            );
+            let t = found.translation;
+            let moved = translation(at[0] + t[0], at[1] + t[1], at[2] + t[2]);
+            assert_eq!(querier.relation(a.1, b.1, &moved), Ok(Relation::Apart), "{found:?}: {what}");
+            // Cores that are as far apart as the radii add up to: there is no depth, but for roundings.
+            if gap.abs() < 1e-12 && a.1.radius() + b.1.radius() > 0.0 {
+                assert!(found.lower < 1e-12 && found.upper < 1e-9, "{found:?}: {what}");
+                touching += 1;
+            }
+        }
+    }
+    assert!(touching > 10, "{touching}");
 }
 
 /// A ball that moves past another one leaves it where the centres are as far apart as both radii; one that is inside a cube
