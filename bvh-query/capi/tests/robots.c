@@ -766,7 +766,7 @@ static void misuse(void) {
     FAILS(cbvh_robot_set_pose(robot, "pillar", &pose), CBVH_INVALID_ARGUMENT, "pose: ");
     const double margins[] = {NAN, -1, INFINITY};
     for (size_t k = 0; k < 3; k++) {
-        FAILS(cbvh_robot_set_margin(robot, "pillar", margins[k]), CBVH_INVALID_ARGUMENT, "radius: expected a length from 0");
+        FAILS(cbvh_robot_set_margin(robot, "pillar", margins[k]), CBVH_INVALID_ARGUMENT, "margin: expected a finite distance of at least 0");
     }
     /* Configurations. */
     FAILS(cbvh_robot_collide(robot, joints, 3, 1, answers), CBVH_INVALID_ARGUMENT,

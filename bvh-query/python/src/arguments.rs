@@ -8,12 +8,12 @@ use bvh_query::floats::with_default_floats;
 use bvh_query::{Pose, PoseError};
 use numpy::npyffi::NPY_ORDER;
 use numpy::{
-    PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods, dtype, get_array_module,
+    PyArray1, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArray, PyUntypedArrayMethods, dtype, get_array_module,
 };
 use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyFloat};
 
 /// Rows that a caller gave, and whether they are one row alone.
 pub(crate) struct Rows<T> {
@@ -166,7 +166,15 @@ pub(crate) fn reserved<T>(count: usize) -> PyResult<Vec<T>> {
 }
 
 /// Reads a number.
+#[pyfunction]
 pub(crate) fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    // Numpy makes numbers of its strings, and of complex numbers without their imaginary parts.
+    if !value.is_instance_of::<PyFloat>()
+        && let Ok(dtype) = value.getattr("dtype").and_then(|dtype| Ok(dtype.cast_into::<PyArrayDescr>()?))
+        && b"cSU".contains(&dtype.kind())
+    {
+        return Err(PyTypeError::new_err(format!("{name}: expected a number, found dtype {}", dtype.str()?)));
+    }
     value.extract().map_err(|error: PyErr| {
         let py = value.py();
         if error.is_instance_of::<PyTypeError>(py) {
@@ -203,6 +211,7 @@ pub(crate) fn limit(value: Option<&Bound<'_, PyAny>>, name: &str) -> PyResult<us
 }
 
 /// Reads a choice.
+#[pyfunction]
 pub(crate) fn flag(value: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
     let wrong = |_| PyTypeError::new_err(format!("{name}: expected a bool, found {}", kind(value)));
     value.extract().map_err(wrong)

@@ -52,8 +52,8 @@ fn _cbvh(module: &Bound<'_, PyModule>) -> PyResult<()> {
         pairs::self_contacts
     ];
     functions![motions::motion, motions::is_free];
-    functions![arguments::copied_numbers, arguments::check_pose, poses::poses_of];
-    functions![poses::relative_poses, poses::nearest_poses];
+    functions![arguments::copied_numbers, arguments::check_pose, arguments::flag, arguments::number];
+    functions![poses::poses_of, poses::relative_poses, poses::nearest_poses];
     functions![
         probes::closest_points,
         probes::sides,

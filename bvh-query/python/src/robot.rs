@@ -3,11 +3,14 @@
 use crate::answers::{Answers, array, matrix, signed_distances};
 use crate::arguments::{number, pose_or_identity};
 use crate::asking::{asked, detached, in_turns, locked, on_pool, on_threads};
-use crate::errors::{backend_error, bake_error, open_error, query_error, question_error, system_error};
+use crate::errors::{
+    backend_error, bake_error, open_error, query_error, question_error, system_error, value_error,
+};
 use crate::mesh::Mesh;
+use crate::motions::options;
 use crate::pairs::depth_options;
 use crate::stops::of_this_thread;
-use bvh_query::{MotionOptions, NumberError, OwnedShape, Pose};
+use bvh_query::{NumberError, OwnedShape, Pose};
 use cbvh_robot::{
     Base, Edge, Geometry, NearPair, OtherBody, RobotDistance, RobotError, RobotMotion, RobotOptions,
     RobotParts, UpAxis,
@@ -170,10 +173,6 @@ fn base_of(name: &str) -> Base {
         "floating" => Base::Floating,
         _ => Base::Fixed,
     }
-}
-
-fn options(clearance: f64, tolerance: Option<f64>) -> MotionOptions {
-    MotionOptions::new().clearance(clearance).tolerance(tolerance)
 }
 
 /// Makes the straight motions from each row to the same one of others.
@@ -345,9 +344,17 @@ impl Robot {
     fn allow_frequent(
         &self,
         py: Python<'_>,
-        samples: usize,
-        share: f64,
+        samples: &Bound<'_, PyAny>,
+        share: &Bound<'_, PyAny>,
     ) -> PyResult<Vec<([String; 2], f64)>> {
+        let wrong = || format!("expected a whole number of at least 1, found {samples}");
+        let samples = samples.extract().ok().filter(|&samples: &usize| samples > 0);
+        let samples = samples.ok_or_else(|| value_error("samples", wrong()))?;
+        let share = number(share, "share")?;
+        if !(share > 0.0 && share <= 1.0) {
+            let found = format!("expected a part above 0 and at most 1, found {share}");
+            return Err(value_error("share", found));
+        }
         asked(py, || {
             let frequent = self.ask(|robot| {
                 let found = on_pool(|stop| {
@@ -597,11 +604,11 @@ impl Robot {
         py: Python<'py>,
         from: PyReadonlyArray2<'_, f64>,
         to: PyReadonlyArray2<'_, f64>,
-        clearance: f64,
-        tolerance: Option<f64>,
+        clearance: &Bound<'_, PyAny>,
+        tolerance: Option<&Bound<'_, PyAny>>,
         parallel: bool,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let (edges, options) = (edges(&from, &to)?, options(clearance, tolerance));
+        let (edges, options) = (edges(&from, &to)?, options(clearance, tolerance)?);
         let free = asked(py, || {
             self.ask(|robot| {
                 for (row, edge) in edges.iter().enumerate().filter(|_| edges.len() > 1) {
@@ -627,11 +634,11 @@ impl Robot {
         &self,
         py: Python<'_>,
         coefficients: PyReadonlyArray2<'_, f64>,
-        clearance: f64,
-        tolerance: Option<f64>,
+        clearance: &Bound<'_, PyAny>,
+        tolerance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Motion> {
         let edge = Edge::polynomials(rows(&coefficients)?);
-        let options = options(clearance, tolerance);
+        let options = options(clearance, tolerance)?;
         let found = asked(py, || {
             self.ask(|robot| {
                 robot.set_stop(Some(of_this_thread()));

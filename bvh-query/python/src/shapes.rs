@@ -1,6 +1,6 @@
 //! Simple shapes: cores that are baked in memory. The Python code gives them radii and makes them solid.
 
-use crate::arguments::rows;
+use crate::arguments::{self, rows};
 use crate::asking::{detached, on_pool};
 use crate::errors::{BakeError, bake_error};
 use crate::mesh::Mesh;
@@ -26,10 +26,10 @@ fn around(py: Python<'_>, found: Result<Circumscribed, ShapeError>) -> PyResult<
     Ok((baked(py, Ok(found.mesh))?, found.error))
 }
 
-/// Points of shape (N, 3).
+/// Points of shape (N, 3), which messages call `name`.
 #[pyfunction]
-pub(crate) fn cloud_core(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Mesh> {
-    let points = rows(points, "points")?.rows;
+pub(crate) fn cloud_core(py: Python<'_>, points: &Bound<'_, PyAny>, name: &str) -> PyResult<Mesh> {
+    let points = arguments::points(points, name)?.rows;
     baked(py, Ok(shapes::cloud(&points)))
 }
 

@@ -39,6 +39,7 @@ class BadArguments(unittest.TestCase):
             (ValueError, "poses: expected numbers in an array", mesh.collide, mesh, [[1, 2], [3]]),
             (ValueError, "within: expected", lambda: mesh.closest_points([0, 0, 0], within=-1)),
             (TypeError, "d: expected a number, found str", mesh.within, mesh, one, "x"),
+            (TypeError, "d: expected a number, found dtype complex128", mesh.within, mesh, one, np.complex128(1j)),
             (ValueError, "d: expected a number that a float can hold", mesh.within, mesh, one, 10**400),
             (ValueError, "d: expected", mesh.within, mesh, np.zeros((0, 4, 4)), -1),
             (TypeError, "parallel: expected a bool, found int", lambda: mesh.collide(mesh, one, parallel=1)),

@@ -627,7 +627,6 @@ class Asking(unittest.TestCase):
         number, found = robot.first_hit(path)
         self.assertEqual((number, found.kind, found.touching_at, found.bodies), (1, hit.kind, hit.touching_at, hit.bodies))
         self.assertIsNone(robot.first_hit(path[:2]))
-        self.assertIsNone(robot.first_hit(path[:1]))
         robot.remove(name)
         self.assertTrue(robot.is_free(start, end))
         self.assertIsNone(robot.first_hit(path, parallel=True))
@@ -1074,6 +1073,7 @@ class Misuse(unittest.TestCase):
 
             link = '<link name="a"/>'
             mesh = '<link name="a"><collision><geometry><mesh filename="{}"/></geometry></collision></link>'
+            shape = '<robot><link name="a"><collision><geometry><{}/></geometry></collision></link></robot>'
             (folder / "broken.obj").write_text("v 1 2\n")
             check_errors(
                 self,
@@ -1090,6 +1090,10 @@ class Misuse(unittest.TestCase):
                     (ValueError, "base: expected one of fixed, planar, floating", lambda: of("", base="free")),
                     (ValueError, "geometry: expected one of collision, visual", lambda: of("", geometry="both")),
                     (ValueError, "NaN", lambda: of(KINDS, cylinder_error=math.nan)),
+                    (TypeError, "cylinder_error: expected a number", lambda: of(KINDS, cylinder_error="1")),
+                    (TypeError, "allow_outside: expected a bool", lambda: of(KINDS, allow_outside="no")),
+                    (ValueError, "line 1, link a, <sphere>: expected a length of at least 0", of, shape.format('sphere radius="-1"')),
+                    (ValueError, "link a, <capsule>: expected", of, shape.format('capsule radius="1" length="-1"')),
                 ],
             )
 
@@ -1123,7 +1127,21 @@ class Misuse(unittest.TestCase):
                 (ValueError, "one configuration each", robot.motion, [q], q),
                 (ValueError, "coefficients: expected shape (4, degree + 1)", robot.motion_along, np.zeros((3, 2))),
                 (ValueError, "coefficients: expected shape (4, degree + 1)", robot.motion_along, np.zeros((4, 0))),
-                (ValueError, "could not convert", robot.collide, ["a", "b", "c", "d"]),
+                (TypeError, "q: expected numbers, found dtype <U1", robot.collide, ["a", "b", "c", "d"]),
+                (TypeError, "q: expected numbers, found dtype complex128", robot.distance, q * 1j),
+                (TypeError, "q1: expected numbers, found dtype complex128", robot.is_free, q, q * 1j),
+                (TypeError, "coefficients: expected numbers", robot.motion_along, np.zeros((4, 2)) * 1j),
+                (TypeError, "clearance: expected a number, found str", lambda: robot.is_free(q, q, clearance="1")),
+                (TypeError, "tolerance: expected a number, found str", lambda: robot.motion(q, q, tolerance="1")),
+                (TypeError, "elbow: expected a number, found str", lambda: robot.q(elbow="1")),
+                (TypeError, "allowed: expected a bool, found str", robot.allow, "hand", "base", "no"),
+                (ValueError, "path: expected at least two configurations, found 1", robot.first_hit, [q]),
+                (ValueError, "path: expected at least two configurations, found 1", robot.first_hit, q),
+                (ValueError, "path: expected at least two configurations, found 0", robot.first_hit, np.zeros((0, 4))),
+                (ValueError, "samples: expected a whole number of at least 1, found -1", robot.allow_frequent, -1),
+                (ValueError, "samples: expected a whole number of at least 1, found 0", robot.allow_frequent, 0),
+                (TypeError, "share: expected a number, found str", robot.allow_frequent, 1, "1"),
+                *((ValueError, "share: expected a part above 0", robot.allow_frequent, 1, share) for share in (math.nan, 2, 0, -1)),
                 (KeyError, "'elbo'", robot.q, {"elbo": 1}),
                 (KeyError, "'finger'; there are base, turret", robot.allow, "hand", "finger"),
                 (KeyError, "'finger'", robot.attach, ball, "finger"),
@@ -1135,7 +1153,8 @@ class Misuse(unittest.TestCase):
                 (ValueError, "hand", lambda: robot.attach(ball, "hand", name="hand")),
                 (ValueError, "pose", robot.add_obstacle, ball, np.eye(3)),
                 (ValueError, "scaled by 2", robot.add_obstacle, ball, np.diag([2.0, 2, 2, 1])),
-                (ValueError, "-1", robot.set_margin, "pillar", -1),
+                (ValueError, "margin: expected a finite distance of at least 0, found -1", robot.set_margin, "pillar", -1),
+                (TypeError, "margin: expected a number, found str", robot.set_margin, "pillar", "1"),
             ],
         )
         # Nothing of that has changed anything.

@@ -109,7 +109,7 @@ class Pairs(unittest.TestCase):
     def test_questions_are_about_all_pairs_that_are_asked_about(self):
         scene = self.scene(1)
         for parallel, tracking in itertools.product((False, True), repeat=2):
-            scene.parallel, scene.tracking = parallel, tracking
+            scene.parallel, scene.tracking = np.bool_(parallel), tracking
             self.assertEqual((scene.parallel, scene.tracking), (parallel, tracking))
             self.check(scene)
         # Others move, come and go.
@@ -614,6 +614,8 @@ class Misuse(unittest.TestCase):
             (ValueError, "tolerance: expected a finite depth of at least 0", lambda: scene.signed_distance(tolerance=np.nan)),
             (TypeError, "tolerance: expected a number, found str", lambda: scene.signed_distance(tolerance="x")),
             (ValueError, "points: expected shape (3,) or (N, 3)", scene.sides, [0, 0]),
+            (TypeError, "parallel: expected a bool, found str", setattr, scene, "parallel", "x"),
+            (TypeError, "tracking: expected a bool, found int", setattr, scene, "tracking", 1),
             (TypeError, "paths: expected a mapping", scene.motion, [motion]),
             (TypeError, f"paths[{here}]: expected a cbvh.Motion", scene.is_free, {here: one}),
             (FileNotFoundError, "no such.cbvh", cbvh.Scene.open, "no such.cbvh"),

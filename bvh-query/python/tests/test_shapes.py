@@ -178,8 +178,24 @@ class Shapes(unittest.TestCase):
                 (ValueError, "radius", lambda: mesh.rounded(inf)),
                 (TypeError, "radius", lambda: mesh.rounded("1")),
                 (ValueError, "side", lambda: cbvh.box([1, 0, 1])),
-                (ValueError, "side", lambda: cbvh.box([1, 1, 1], rounding=0.5)),
+                (ValueError, "rounding: expected less than half of each side", lambda: cbvh.box([1, 1, 1], rounding=0.5)),
+                (ValueError, "rounding: expected a finite length", lambda: cbvh.box([1, 1, 1], rounding=nan)),
+                (ValueError, "rounding: expected a finite length", lambda: cbvh.box([1, 1, 1], rounding=-1)),
                 (ValueError, "sides", lambda: cbvh.box([1, 1])),
+                (ValueError, "sides: expected shape (3,), found ()", lambda: cbvh.box(1)),
+                (TypeError, "sides: expected numbers, found dtype complex128", lambda: cbvh.box([1, 1j, 1])),
+                (ValueError, "length: expected a finite length", lambda: cbvh.capsule(1, -1)),
+                (ValueError, "length: expected a finite length", lambda: cbvh.capsule(1, nan)),
+                (TypeError, "length: expected a number", lambda: cbvh.capsule(1, "1")),
+                (TypeError, "centre: expected numbers", lambda: cbvh.sphere(1, ["1", 0, 0])),
+                (TypeError, "centre: expected numbers", lambda: cbvh.sphere(1, np.array([1j, 0, 0]))),
+                (ValueError, "centre: expected finite", lambda: cbvh.sphere(1, [nan, 0, 0])),
+                (ValueError, "centre: expected shape (3,), found (2,)", lambda: cbvh.sphere(1, [0, 0])),
+                (TypeError, "radius: expected a number, found dtype complex64", lambda: cbvh.sphere(np.complex64(1j))),
+                (TypeError, "radius: expected a number, found dtype <U1", lambda: cbvh.sphere(np.str_("1"))),
+                (ValueError, "points[1]: expected finite coordinates, found NaN", lambda: cbvh.cloud([[0, 0, 0], [nan, 0, 0]])),
+                (ValueError, "heights: expected finite", lambda: cbvh.height_field([[0, nan], [0, 0]], [1, 1])),
+                (TypeError, "heights: expected numbers", lambda: cbvh.height_field([[0, 1j], [0, 0]], [1, 1])),
                 (ValueError, "length", lambda: cbvh.cylinder(1, nan)),
                 (ValueError, "max_error", lambda: cbvh.cone(1, 1, max_error=0)),
                 (ValueError, "heights", lambda: cbvh.height_field([1, 2], [1, 1])),
@@ -207,8 +223,7 @@ class Shapes(unittest.TestCase):
         ):
             with self.assertRaises(cbvh.BakeError):
                 empty()
-        with self.assertRaises(cbvh.BakeError):
-            cbvh.cloud([[nan, 0, 0]])
+        self.assertEqual(cbvh.capsule(1, 0).radius, 1)
 
     def test_shapes_travel(self):
         for mesh in (cbvh.sphere(1.5), cbvh.box([1, 2, 3], rounding=0.25), cbvh.cloud([[0, 0, 0]], 2.0)):

@@ -358,7 +358,7 @@ impl Robot {
     pub fn set_margin(&mut self, name: &str, margin: f64) -> Result<(), RobotError> {
         // A radius of its own would make up for a negative margin.
         if !(0.0..f64::INFINITY).contains(&margin) {
-            return Err(QueryError::from(NumberError::Radius(margin)).into());
+            return Err(QueryError::from(NumberError::Margin(margin)).into());
         }
         self.reshape(name, |part| Ok((part.bare.clone(), margin)))
     }

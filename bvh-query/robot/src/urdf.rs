@@ -304,7 +304,7 @@ impl Urdf<'_> {
         let of = self.description;
         let shape = of.child(node, Tag::Geometry).and_then(|geometry| of.all(geometry).next());
         let shape = shape.ok_or_else(|| of.error(node, "a geometry", "none"))?;
-        let number = |key| of.number(shape, key);
+        let length = |key| of.length(shape, key);
         Ok(match of.tag(shape) {
             Tag::Mesh => {
                 let scale = of.numbers(shape, Attribute::Scale)?.unwrap_or([1.0; 3]);
@@ -316,12 +316,12 @@ impl Urdf<'_> {
             Tag::Block => Described::Block(
                 of.numbers(shape, Attribute::Size)?.ok_or_else(|| of.lacks(shape, Attribute::Size))?,
             ),
-            Tag::Ball => Described::Ball(number(Attribute::Radius)?),
+            Tag::Ball => Described::Ball(length(Attribute::Radius)?),
             Tag::Cylinder => {
-                Described::Cylinder { radius: number(Attribute::Radius)?, length: number(Attribute::Length)? }
+                Described::Cylinder { radius: length(Attribute::Radius)?, length: length(Attribute::Length)? }
             }
             Tag::Capsule => {
-                Described::Capsule { radius: number(Attribute::Radius)?, length: number(Attribute::Length)? }
+                Described::Capsule { radius: length(Attribute::Radius)?, length: length(Attribute::Length)? }
             }
             _ => return Err(of.error(shape, "a mesh, box, sphere, cylinder or capsule", of.name(shape))),
         })

@@ -211,10 +211,14 @@ impl<'a> Description<'a> {
         numbers.map(Some).ok_or_else(|| self.error(element, expected, found()))
     }
 
-    /// Returns the number of an attribute that has to be there.
-    pub(crate) fn number(&self, element: Number, key: Attribute) -> Result<f64, RobotError> {
-        let found = self.numbers(element, key)?;
-        found.map(|[number]| number).ok_or_else(|| self.lacks(element, key))
+    /// Returns the length of an attribute that has to be there.
+    pub(crate) fn length(&self, element: Number, key: Attribute) -> Result<f64, RobotError> {
+        let [length] = self.numbers(element, key)?.ok_or_else(|| self.lacks(element, key))?;
+        if length < 0.0 {
+            let found = format!("{}=\"{length}\"", key.name());
+            return Err(self.error(element, "a length of at least 0", found));
+        }
+        Ok(length)
     }
 }
 

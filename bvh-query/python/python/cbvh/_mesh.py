@@ -44,12 +44,6 @@ def _other(mesh: Mesh) -> _cbvh.Mesh:
     return mesh._mesh
 
 
-def _length(value: Any, name: str) -> float:
-    if isinstance(value, (str, bytes)) or not hasattr(value, "__float__"):
-        raise TypeError(f"{name}: expected a number, found {type(value).__name__}")
-    return float(value)
-
-
 class Mesh:
     """A mesh in a ``.cbvh`` file: all objects of the file, or one. Made by `open` and `bake`.
 
@@ -131,7 +125,11 @@ class Mesh:
 
     @property
     def bounds(self) -> Floats:
-        """The lower and the upper corner of the axis-aligned box of all vertices, in mesh units, shape (2, 3)."""
+        """The lower and the upper corner of an axis-aligned box that contains all vertices, in mesh units, shape (2, 3).
+
+        It is exact where each coordinate is the sum of the object's origin and a float32, and else wider by what float32 leaves
+        out, usually some 1e-7 of its size. The radius is not part of it.
+        """
         return self._mesh.bounds()
 
     @property
@@ -145,7 +143,11 @@ class Mesh:
         return self._mesh.size()
 
     def object(self, object: int | str) -> Mesh:
-        """One object of the file, by number or name."""
+        """One object of the file, by number or name.
+
+        Raises IndexError for a number that no object has, such as a negative one, and ValueError for a name that none or several
+        have.
+        """
         if isinstance(object, str):
             names = self.names
             if names.count(object) != 1:
@@ -166,7 +168,7 @@ class Mesh:
         their radii, exactly, and their distance is that of the triangles less the sum, at least 0. The file stays the same, and
         is shared.
         """
-        return Mesh(self._mesh.rounded(_length(radius, "radius")), self._path, self._object)
+        return Mesh(self._mesh.rounded(_cbvh.number(radius, "radius")), self._path, self._object)
 
     def solid(self) -> Mesh:
         """The same mesh as a solid: what is inside it touches it, at distance 0. Raises ValueError if it is not closed."""
@@ -591,12 +593,12 @@ class Mesh:
         pose: ArrayLike | None = None,
         parallel: bool = False,
     ) -> Any:
-        """All triangles that rays hit, in the exact order along each: a `RayHit` of arrays of K elements, or a list of
-        N.
+        """All hits of rays, in the exact order along each: a `RayHit` of arrays of K elements, or a list of N.
 
-        Arguments are those of `first_hits`. A mesh with a radius is one body, and its hits are where the ray enters and leaves it,
-        in turns: at 0 if it starts inside, and without an exit if it ends there. A closed core is hollow also if it is solid.
-        Parts of the ray inside are told apart if their bounds prove the gap between them.
+        Each parameter occurs once, with one triangle, however many triangles are hit at exactly that parameter. Arguments are those
+        of `first_hits`. A mesh with a radius is one body, and its hits are where the ray enters and leaves it, in turns: at 0 if
+        it starts inside, and without an exit if it ends there. A closed core is hollow also if it is solid. Parts of the ray
+        inside are told apart if their bounds prove the gap between them.
         """
         found = _cbvh.all_hits((self._mesh, pose, parallel), origins, directions, until)
         return [RayHit(*hits) for hits in found] if isinstance(found, list) else RayHit(*found)
@@ -637,7 +639,8 @@ def open(path: str | os.PathLike[str], object: int | str | None = None) -> Mesh:
     The bytes of the file must not change while it is open. If they do, answers are undefined, and formally so is
     everything that the process does. If the file is truncated, the system ends the process as soon as a query needs
     the missing part. Replace a file by renaming another one over it, as `save` does. `Mesh.from_bytes` copies instead.
-    A file that is already damaged raises FormatError.
+    A file that is already damaged raises FormatError. An ``object`` that the file does not have raises IndexError if it is a
+    number, and ValueError if it is a name: see `Mesh.object`.
     """
     name = os.fsdecode(path)
     mesh = Mesh(_cbvh.Mesh.open(name), os.path.abspath(name))

@@ -185,10 +185,10 @@ class Robot:
                 None if srdf is None else os.fspath(srdf),
                 geometry == "visual",
                 base,
-                float(cylinder_error),
-                bool(apply_up_axis),
+                _cbvh.number(cylinder_error, "cylinder_error"),
+                _cbvh.flag(apply_up_axis, "apply_up_axis"),
                 None if cache is None else os.fspath(cache),
-                bool(allow_outside),
+                _cbvh.flag(allow_outside, "allow_outside"),
             )
         )
 
@@ -265,7 +265,7 @@ class Robot:
         for name, value in {**(values or {}), **more}.items():
             if name not in joints:
                 raise KeyError(f"expected the name of a joint value, found {name!r}")
-            q[joints.index(name)] = value
+            q[joints.index(name)] = _cbvh.number(value, name)
         return q
 
     @property
@@ -275,16 +275,16 @@ class Robot:
 
     def allow(self, a: str, b: str, allowed: bool = True) -> None:
         """Allows contact between two bodies, so that they are not checked; or checks them again."""
-        self._robot.allow(a, b, bool(allowed))
+        self._robot.allow(a, b, _cbvh.flag(allowed, "allowed"))
 
     def allow_frequent(self, samples: int = 1000, share: float = 0.95) -> list[tuple[tuple[str, str], float]]:
         """Allows contact between pairs that collide in nearly every configuration, and returns them with their shares.
 
-        These are the pairs that touch in at least ``share`` of some random configurations within the joints' limits, as in MoveIt's
-        assistant. A joint
-        value without limits is taken between -pi and pi. The configurations are the same each time.
+        These are the pairs that touch in at least ``share``, above 0 and at most 1, of so many random configurations within the
+        joints' limits, as in MoveIt's assistant. A joint value without limits is taken between -pi and pi. The configurations are
+        the same each time.
         """
-        found = self._robot.allow_frequent(int(samples), float(share))
+        found = self._robot.allow_frequent(samples, share)
         return [((a, b), part) for (a, b), part in found]
 
     def add_obstacle(
@@ -367,7 +367,7 @@ class Robot:
     def set_margin(self, name: str, margin: float) -> None:
         """Sets how near others may come to a body: a link, an obstacle or an attached object. Nearer counts as contact, and
         distances are less by it. The margin is that of this body alone: what is attached to a link does not get the link's."""
-        self._robot.set_margin(name, float(margin))
+        self._robot.set_margin(name, _cbvh.number(margin, "margin"))
 
     def make_solid(self, name: str) -> None:
         """Makes a body a solid: what is inside touches it from now on, also inside the mesh of a link. ValueError if its
@@ -375,7 +375,7 @@ class Robot:
         self._robot.make_solid(name)
 
     def _rows(self, q: ArrayLike, name: str = "q") -> tuple[NDArray[np.float64], bool]:
-        rows = np.ascontiguousarray(q, dtype=np.float64)
+        rows = _cbvh.copied_numbers(q, name)
         count = len(self.joints)
         if rows.ndim not in (1, 2) or rows.shape[-1] != count:
             raise ValueError(f"{name}: expected shape ({count},) or (N, {count}), found {rows.shape}")
@@ -529,7 +529,7 @@ class Robot:
         than 16,384 radians is refused with ValueError.
         """
         from_, to, one = self._ends(q0, q1)
-        free = self._robot.is_free(from_, to, float(clearance), tolerance, parallel)
+        free = self._robot.is_free(from_, to, clearance, tolerance, parallel)
         if self._unseen and len(from_):
             self._look_inside(from_[0])
         return bool(free[0]) if one else free
@@ -546,10 +546,12 @@ class Robot:
     def first_hit(
         self, path: ArrayLike, *, clearance: float = 0.0, tolerance: float | None = None, parallel: bool = False
     ) -> tuple[int, RobotMotion] | None:
-        """The first of the straight motions through the rows of ``path`` that is not free: its number, from 0, and its answer,
-        which says what touches or comes near, and when. None if all are free. See `motion` for the answer, and `is_free` to learn
-        of each motion whether it is free."""
+        """The first of the straight motions through the rows of ``path``, two or more, that is not free: its number, from 0, and its
+        answer, which says what touches or comes near, and when. None if all are free. See `motion` for the answer, and `is_free` to
+        learn of each motion whether it is free."""
         rows, _ = self._rows(path, "path")
+        if len(rows) < 2:
+            raise ValueError(f"path: expected at least two configurations, found {len(rows)}")
         keys: dict[str, Any] = {"clearance": clearance, "tolerance": tolerance}
         for number in np.flatnonzero(~self.is_free(rows[:-1], rows[1:], parallel=parallel, **keys)).tolist():
             found = self.motion(rows[number], rows[number + 1], **keys)
@@ -564,11 +566,11 @@ class Robot:
 
         ``coefficients`` has shape (n, degree + 1), the constants first: a piece of a spline, or of a trapezoidal profile.
         """
-        of = np.ascontiguousarray(coefficients, dtype=np.float64)
+        of = _cbvh.copied_numbers(coefficients, "coefficients")
         count = len(self.joints)
         if of.ndim != 2 or of.shape[0] != count or of.shape[1] == 0:
             raise ValueError(f"coefficients: expected shape ({count}, degree + 1), found {of.shape}")
-        kind, free_until, at, joints, bodies, distance = self._robot.motion(of, float(clearance), tolerance)
+        kind, free_until, at, joints, bodies, distance = self._robot.motion(of, clearance, tolerance)
         if self._unseen:
             self._look_inside(of[:, 0])
         is_free = kind == 0

@@ -35,7 +35,7 @@ from ._answers import (
     clash_of,
     named,
 )
-from ._mesh import Mesh, _length
+from ._mesh import Mesh
 from ._motion import Path, read_path
 from ._view import View, called, limit, show
 
@@ -223,7 +223,7 @@ class Scene:
     def set_margin(self, id: int | str, margin: float) -> None:
         """Gives an instance a margin in mesh units, which is added to the radius of its mesh in every query. 0 at first.
         What is attached to the instance has a margin of its own."""
-        self._scene.set_margin(self._number(id, "id"), _length(margin, "margin"))
+        self._scene.set_margin(self._number(id, "id"), _cbvh.number(margin, "margin"))
 
     def margin(self, id: int | str) -> float:
         """The margin of an instance."""
@@ -231,7 +231,7 @@ class Scene:
 
     def set_pair_margin(self, a: int | str, b: int | str, margin: float) -> None:
         """Gives a pair of instances a further margin in mesh units. 0 at first."""
-        self._scene.set_pair_margin(self._number(a, "a"), self._number(b, "b"), _length(margin, "margin"))
+        self._scene.set_pair_margin(self._number(a, "a"), self._number(b, "b"), _cbvh.number(margin, "margin"))
 
     def find(self, name: str) -> int | None:
         """The number of the instance with a name, or None."""
@@ -307,7 +307,7 @@ class Scene:
 
     @parallel.setter
     def parallel(self, parallel: bool) -> None:
-        self._scene.set_switches(bool(parallel), self._scene.switches()[1])
+        self._scene.set_switches(_cbvh.flag(parallel, "parallel"), self._scene.switches()[1])
 
     @property
     def tracking(self) -> bool:
@@ -317,7 +317,7 @@ class Scene:
 
     @tracking.setter
     def tracking(self, tracking: bool) -> None:
-        self._scene.set_switches(self._scene.switches()[0], bool(tracking))
+        self._scene.set_switches(self._scene.switches()[0], _cbvh.flag(tracking, "tracking"))
 
     def view(self, path: str | os.PathLike[str] | None = None, *, max_bytes: int | None = None) -> View:
         """A page that shows the scene as it is, and which pairs touch. A notebook shows it at once, and ``path`` says where to
@@ -344,7 +344,8 @@ class Scene:
         return _cbvh.scene_pairs_within(self._scene, d)
 
     def relations(self) -> SceneRelations:
-        """All pairs that touch, or of which one is inside the other, wholly or in part, with their relations."""
+        """All pairs that touch, or of which one is inside the other, wholly or in part, with their relations. Also those whose boxes
+        in the world meet and whose relation is UNDEFINED, because a mesh is not closed."""
         pairs, relations = _cbvh.scene_relations(self._scene)
         return SceneRelations(pairs, named(Relation, relations))
 
@@ -580,7 +581,7 @@ class Scene:
 @functools.cache
 def _empty() -> Mesh:
     """A mesh that no query is about."""
-    return Mesh(_cbvh.cloud_core([[0, 0, 0]]))
+    return Mesh(_cbvh.cloud_core([[0, 0, 0]], "points"))
 
 
 def _hits(found: tuple[Any, tuple[Any, ...]]) -> SceneRayHit:

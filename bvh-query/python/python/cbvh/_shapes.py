@@ -12,22 +12,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _cbvh
-from ._mesh import Mesh, _length
+from ._mesh import Mesh
 
 # How much larger a polyhedron may be by default, as a fraction of the radius.
 _ROUNDNESS = 0.002
 
 
-def _lengths(values: Any, name: str, count: int) -> list[float]:
-    lengths = [_length(value, name) for value in values]
-    if len(lengths) != count:
-        raise ValueError(f"{name}: expected {count} lengths, found {len(lengths)}")
-    return lengths
+def _numbers(values: ArrayLike, name: str, count: int) -> list[float]:
+    numbers = _cbvh.copied_numbers(values, name)
+    if numbers.shape != (count,):
+        raise ValueError(f"{name}: expected shape ({count},), found {numbers.shape}")
+    found: list[float] = numbers.tolist()
+    return found
+
+
+def _length(value: Any, name: str) -> float:
+    """A length that may be 0."""
+    length = _cbvh.number(value, name)
+    if not 0 <= length < np.inf:
+        raise ValueError(f"{name}: expected a finite length of at least 0, found {length}")
+    return length
 
 
 def sphere(radius: float, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
     """A ball: a point with a radius."""
-    return Mesh(_cbvh.cloud_core(np.asarray(centre, np.float64).reshape(1, -1))).rounded(radius)
+    return Mesh(_cbvh.cloud_core(_numbers(centre, "centre", 3), "centre")).rounded(radius)
 
 
 def capsule(radius: float, length: float) -> Mesh:
@@ -38,43 +47,47 @@ def capsule(radius: float, length: float) -> Mesh:
 
 def box(sides: ArrayLike, *, rounding: float = 0.0) -> Mesh:
     """A solid box, its middle at the origin. ``rounding``: the radius of its edges and corners, within the sides."""
-    rounding = _length(rounding, "rounding")
-    core = [side - 2 * rounding for side in _lengths(sides, "sides", 3)]
+    lengths, rounding = _numbers(sides, "sides", 3), _length(rounding, "rounding")
+    if 0 < min(lengths) <= 2 * rounding:
+        raise ValueError(f"rounding: expected less than half of each side, found {rounding} beside {min(lengths)}")
+    core = [length - 2 * rounding for length in lengths]
     return Mesh(_cbvh.block_core(core)).solid().rounded(rounding)
 
 
 def ground(sides: ArrayLike = (1000.0, 1000.0), thickness: float = 1.0) -> Mesh:
     """The solid ground under z = 0: a box of these sides along x and y. Beyond its sides there is nothing."""
-    return Mesh(_cbvh.ground_core(_lengths(sides, "sides", 2), _length(thickness, "thickness"))).solid()
+    return Mesh(_cbvh.ground_core(_numbers(sides, "sides", 2), _cbvh.number(thickness, "thickness"))).solid()
 
 
 def cylinder(radius: float, length: float, *, max_error: float | None = None) -> Mesh:
     """A solid prism around a cylinder along z, its middle at the origin, at most ``max_error`` larger in mesh units; by
     default 0.002 of the radius."""
-    radius = _length(radius, "radius")
-    error = _ROUNDNESS * radius if max_error is None else _length(max_error, "max_error")
-    return Mesh(_cbvh.cylinder_core(radius, _length(length, "length"), error)[0]).solid()
+    radius = _cbvh.number(radius, "radius")
+    error = _ROUNDNESS * radius if max_error is None else _cbvh.number(max_error, "max_error")
+    return Mesh(_cbvh.cylinder_core(radius, _cbvh.number(length, "length"), error)[0]).solid()
 
 
 def cone(radius: float, height: float, *, max_error: float | None = None) -> Mesh:
     """A solid pyramid around a cone, its base at z = 0 and its apex at z = ``height``: see `cylinder`."""
-    radius = _length(radius, "radius")
-    error = _ROUNDNESS * radius if max_error is None else _length(max_error, "max_error")
-    return Mesh(_cbvh.cone_core(radius, _length(height, "height"), error)[0]).solid()
+    radius = _cbvh.number(radius, "radius")
+    error = _ROUNDNESS * radius if max_error is None else _cbvh.number(max_error, "max_error")
+    return Mesh(_cbvh.cone_core(radius, _cbvh.number(height, "height"), error)[0]).solid()
 
 
 def height_field(heights: ArrayLike, cell: ArrayLike) -> Mesh:
     """A surface over a grid: ``heights`` of shape (rows, columns), rows along y, columns along x, from the origin on.
     ``cell``: how far columns and rows are apart."""
-    grid = np.ascontiguousarray(heights, np.float64)
+    grid = _cbvh.copied_numbers(heights, "heights")
     if grid.ndim != 2:
         raise ValueError(f"heights: expected shape (rows, columns), found {grid.shape}")
-    return Mesh(_cbvh.height_field_core(grid, _lengths(cell, "cell", 2)))
+    if not np.isfinite(grid).all():
+        raise ValueError("heights: expected finite numbers, found others")
+    return Mesh(_cbvh.height_field_core(grid, _numbers(cell, "cell", 2)))
 
 
 def cloud(points: ArrayLike, radius: float = 0.0) -> Mesh:
     """Points, each a ball of this radius. ``points`` has shape (N, 3). Triangle ``i`` of answers is point ``i``."""
-    return Mesh(_cbvh.cloud_core(points)).rounded(radius)
+    return Mesh(_cbvh.cloud_core(points, "points")).rounded(radius)
 
 
 def convex_hull(points: ArrayLike) -> Mesh:
@@ -95,7 +108,7 @@ def voxels(cells: ArrayLike, side: float) -> Mesh:
         raise ValueError(f"cells: {expected}, found {grid.dtype} of shape {grid.shape}")
     if grid.size and (grid.min() < -(2**31) or grid.max() >= 2**31):
         raise ValueError("cells: expected numbers of 32 bits")
-    return Mesh(_cbvh.voxels_core(np.ascontiguousarray(grid, np.int32), _length(side, "side")))
+    return Mesh(_cbvh.voxels_core(np.ascontiguousarray(grid, np.int32), _cbvh.number(side, "side")))
 
 
 def octree(cells: Any, sizes: ArrayLike | None = None) -> Mesh:

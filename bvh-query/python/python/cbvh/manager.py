@@ -40,7 +40,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _cbvh
 from ._answers import Floats
 from ._baking import bake
-from ._mesh import Mesh, _length
+from ._mesh import Mesh
 from ._poses import relative
 from ._scene import Scene
 from ._shapes import cylinder, sphere
@@ -93,7 +93,7 @@ def _geometry(mesh: Any, radius: float = 0.0, solid: bool = False) -> _Geometry:
     geometry = _of_radius_0(mesh)
     if solid and not geometry.mesh.is_solid:
         geometry = _Geometry(geometry.mesh.solid())
-    if _length(radius, "radius") == 0:
+    if _cbvh.number(radius, "radius") == 0:
         return geometry
     return _Geometry(geometry.mesh.rounded(geometry.mesh.radius + radius))
 
