@@ -17,11 +17,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) const SCRATCH_NAME: &str = "cbvh-scratch";
 
 /// Replaces a file by `bytes` such that its name always refers either to the old content or to all of `bytes`. What is
-/// mapped or open under the old name keeps its content.
+/// mapped or open under the old name keeps its content. If the name is a symbolic link, the file to which it leads is replaced,
+/// and the link stays.
 ///
 /// # Errors
-/// [`BakeError::Write`] if the system refuses, or if something other than a regular file has the name.
-/// Nothing is left behind then.
+/// [`BakeError::Write`] if the system refuses, or if something other than a regular file has the name, such as a link into
+/// `/proc` or `/dev`. Nothing is left behind then.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), BakeError> {
     write_atomically_with(path, |out| out.write_all(bytes))
 }
@@ -36,6 +37,7 @@ pub fn write_atomically_with(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), BakeError> {
     refuse_special(path)?;
+    let path = &target(path)?;
     remove_stale_beside(path);
     let mut temporary = Temporary::beside(path)?;
     write(&mut temporary.file).map_err(failed(path, "write"))?;
@@ -50,16 +52,45 @@ pub fn discard_unfinished() {
     std::mem::forget(live);
 }
 
+/// The most links that lead from a name to its file; Linux follows as many.
+const MAX_LINKS: usize = 40;
+
+/// Returns the file to which the links of an output's name lead, whether it exists or not; the name itself if it is no link.
+/// Links of the system, such as `/dev/stdout`, and links to its files are refused: what they lead to depends on the process.
+pub(crate) fn target(path: &Path) -> Result<PathBuf, BakeError> {
+    let is_of_system = |path: &Path| {
+        let folder = fs::canonicalize(directory_of(path)).unwrap_or_default();
+        ["/proc", "/dev"].iter().any(|system| folder.starts_with(system))
+    };
+    let mut target = path.to_owned();
+    for _ in 0..MAX_LINKS {
+        let Ok(next) = fs::read_link(&target) else { return Ok(target) };
+        let is_link_of_system = is_of_system(&target);
+        target.pop();
+        target.push(next);
+        if is_link_of_system || is_of_system(&target) {
+            break;
+        }
+    }
+    Err(special(path, "a special file"))
+}
+
+/// Returns the error of an output that is no regular file.
+fn special(path: &Path, found: &str) -> BakeError {
+    let source = io::Error::other(format!("expected a regular file or none, found {found}"));
+    BakeError::Write { path: path.to_owned(), action: "replace", source }
+}
+
 /// Refuses what a rename would wrongly replace, or would fail on late: a device, a directory, or a file in use.
 pub(crate) fn refuse_special(path: &Path) -> Result<(), BakeError> {
+    target(path)?;
     let found = match fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => "a directory",
         Ok(metadata) if !metadata.is_file() => "a special file",
         _ if cfg!(windows) && names_device(path) => "the name of a device",
         _ => return refuse_in_use(path),
     };
-    let source = io::Error::other(format!("expected a regular file or none, found {found}"));
-    Err(BakeError::Write { path: path.to_owned(), action: "replace", source })
+    Err(special(path, found))
 }
 
 /// Refuses a file that another process has opened without allowing others to replace it, as most programs do on
@@ -100,7 +131,8 @@ fn kept(path: &Path) -> impl Fn(io::Error) -> BakeError {
 /// Removes what killed processes left in the directory of an output: the temporary files for that output, and scratch
 /// files.
 pub(crate) fn remove_stale_beside(output: &Path) {
-    remove_stale(directory_of(output), &[output.file_name().unwrap_or_default(), SCRATCH_NAME.as_ref()]);
+    let Ok(output) = target(output) else { return };
+    remove_stale(directory_of(&output), &[output.file_name().unwrap_or_default(), SCRATCH_NAME.as_ref()]);
 }
 
 /// Removes the temporary files for any of the given names that killed processes left in a directory.

@@ -1,6 +1,6 @@
 //! `cbvh motion`: checks whether motions between two poses are free, and when they first touch.
 
-use crate::asking::files::{self, read_all, read_motions, write_file};
+use crate::asking::files::{self, read_all, read_motions, refuse_overwriting, write_file};
 use crate::asking::mesh;
 use crate::asking::{self, Answer, AskingArguments, Session};
 use crate::console::{Failure, Record, record, significant};
@@ -70,12 +70,14 @@ pub(crate) fn run(arguments: &MotionArguments) -> Result<(), Failure> {
     let ask = |querier: &mut Querier, [a, b]: [Shape<'_>; 2], motion: &Motion| {
         querier.motion(a, b, motion, &options)
     };
+    let meshes = [&arguments.a, &arguments.b];
     let Some(motion) = &arguments.motion else {
         let files = arguments.motions.as_deref();
-        let files = read_all(files, "files of motions", &arguments.asking, read_motions)?;
+        let files = read_all(files, "files of motions", &arguments.asking, &meshes, read_motions)?;
         let session = session()?;
         return session.ask_files(&files, |querier, motion| ask(querier, session.shapes(), motion));
     };
+    refuse_overwriting(&arguments.witness, meshes)?;
     let motion = files::one_motion(motion)?;
     let session = session()?;
     let answer = session.ask(|querier| ask(querier, session.shapes(), &motion))?;

@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<(), Failure> {
         return session.tell_one(&answer, &answer.describe(session.meshes()[0]));
     }
     let (files, read) = (arguments.files.as_deref(), |file: &Path| read(file, mode));
-    let files = read_all(files, "files of points, rays or segments", options, read)?;
+    let files = read_all(files, "files of points, rays or segments", options, &[&arguments.a], read)?;
     let session = session()?;
     session.ask_files(&files, |querier, question: &Question| question.ask(querier, session.shapes()[0]))
 }

@@ -85,14 +85,29 @@ pub(crate) fn give_back() {
     }
 }
 
-/// Starts a thread that waits for an interrupt or a request to terminate. It removes unfinished files, prints one line,
-/// and then lets the signal end the process as usual, so that its parent sees which signal it was.
+/// Returns whether the process ignores the end of its terminal, as `nohup` has it do.
+#[cfg(unix)]
+#[allow(unsafe_code, reason = "no safe function tells what a signal does")]
+fn ignores_hangup() -> bool {
+    // SAFETY: zeros are a valid `sigaction`, whose fields are numbers and a handler that may be null. With no new action,
+    // `sigaction` only writes the present one to `action`, which is valid for it.
+    unsafe {
+        let mut action: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut action) == 0
+            && action.sa_sigaction == libc::SIG_IGN
+    }
+}
+
+/// Starts a thread that waits for an interrupt, a request to terminate or the end of the terminal. It removes unfinished
+/// files, prints one line, and then lets the signal end the process as usual, so that its parent sees which signal it was.
 #[cfg(unix)]
 pub(crate) fn remove_unfinished_files(spinner: &ProgressBar) -> Result<(), Failure> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::low_level::{emulate_default_handler, signal_name};
     let failed = |error| Failure::System(format!("cannot wait for signals: {error}"));
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).map_err(failed)?;
+    let hangup = (!ignores_hangup()).then_some(SIGHUP);
+    let mut signals =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM].into_iter().chain(hangup)).map_err(failed)?;
     let spinner = spinner.clone();
     let wait = move || {
         if let Some(signal) = signals.forever().next() {

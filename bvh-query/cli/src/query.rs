@@ -1,6 +1,6 @@
 //! `cbvh query`: runs queries about two meshes, for files of poses or for one pose.
 
-use crate::asking::files::{self, read_all, read_poses, write_file};
+use crate::asking::files::{self, read_all, read_poses, refuse_overwriting, write_file};
 use crate::asking::mesh::{self, LoadedMesh};
 use crate::asking::{self, AskingArguments, Session};
 use crate::console::{Failure, Record, counted, record, significant};
@@ -107,12 +107,14 @@ pub(crate) fn run(arguments: &QueryArguments) -> Result<(), Failure> {
     let question = Question::new(arguments)?;
     let what = (backend, ["pose", "poses"], asking::mode_name(&question.mode), question.is_exact());
     let session = || Session::load(&arguments.asking, what, &arguments.a, Some(&arguments.b));
+    let meshes = [&arguments.a, &arguments.b];
     if let Some(files) = &arguments.poses {
-        let files = read_all(Some(files), "pose files", &arguments.asking, read_poses)?;
+        let files = read_all(Some(files), "pose files", &arguments.asking, &meshes, read_poses)?;
         let session = session()?;
         return session.ask_files(&files, |querier, pose| question.ask(querier, session.shapes(), pose));
     }
     arguments.asking.require_no_files()?;
+    refuse_overwriting(&arguments.witness, meshes)?;
     let pose = arguments.pose.as_deref().map_or(Ok(Pose::IDENTITY), files::one_pose)?;
     let session = session()?;
     let answer = session.ask(|querier| question.ask(querier, session.shapes(), &pose))?;

@@ -3,18 +3,21 @@
 
 use super::AskingArguments;
 use crate::console::Failure;
+use bvh_bake::BakeError;
 use bvh_query::{Motion, Pose};
 use serde::de::DeserializeOwned;
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Reads all files of a list before any question is asked, so that a mistake in the last file is reported first.
-/// Returns their stems and the questions to ask. `what` names the files in messages.
+/// Returns their stems and the questions to ask. `what` names the files in messages. No output may replace a file or a mesh.
 pub(crate) fn read_all<T>(
     list: Option<&str>,
     what: &str,
     arguments: &AskingArguments,
+    meshes: &[&PathBuf],
     read: impl Fn(&Path) -> Result<Vec<T>, Failure>,
 ) -> Result<Vec<(String, Vec<T>)>, Failure> {
     let names = list.unwrap_or_default().split(',').filter(|name| !name.is_empty());
@@ -26,6 +29,8 @@ pub(crate) fn read_all<T>(
         let what = format_args!("--out: expected %s in the name, because there are several {what}");
         return Err(Failure::usage(what));
     }
+    let outputs = files.iter().filter_map(|file| arguments.raw_file(&stem(file)));
+    refuse_overwriting(outputs, files.iter().chain(meshes.iter().copied()))?;
     let read = |file: PathBuf| {
         let mut questions = read(&file)?;
         if arguments.run.limit > 0 {
@@ -181,6 +186,60 @@ pub(crate) fn stem(path: &Path) -> String {
 pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     let written = bvh_bake::write_atomically(path, text.as_bytes());
     written.map_err(|error| Failure::from_bake(path.display(), &error))
+}
+
+/// Refuses an output that is an input, which it would replace, and two outputs in one file.
+pub(crate) fn refuse_overwriting(
+    outputs: impl IntoIterator<Item = impl AsRef<Path>>,
+    inputs: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<(), Failure> {
+    let mut places = HashMap::new();
+    for output in outputs {
+        let output = output.as_ref().to_owned();
+        if let Some(output) = places.insert(place(&output), output) {
+            let what = "expected a different file for each output, found the same file for two";
+            return Err(Failure::Usage(format!("{}: {what}", output.display())));
+        }
+    }
+    if places.is_empty() {
+        return Ok(());
+    }
+    match inputs.into_iter().find_map(|input| places.remove(&place(input.as_ref()))) {
+        Some(path) => {
+            Err(Failure::from_bake(path.display(), &BakeError::OutputIsInput { path: path.clone() }))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The most links that lead from a name to its file.
+const MAX_LINKS: usize = 40;
+
+/// Returns the same path for a file however it is named, whether it exists or not. Folders that do not exist contain no links.
+pub(crate) fn place(path: &Path) -> PathBuf {
+    let mut path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    // A link may lead to a file that does not exist yet.
+    for _ in 0..MAX_LINKS {
+        let Ok(target) = std::fs::read_link(&path) else { break };
+        path.pop();
+        path.push(target);
+    }
+    let place = resolve(&path);
+    // Windows ignores the case of letters in names.
+    if cfg!(windows) { place.to_string_lossy().to_lowercase().into() } else { place }
+}
+
+/// Returns a path without `.`, `..` and links to folders, whether it exists or not.
+fn resolve(path: &Path) -> PathBuf {
+    if let Ok(resolved) = std::fs::canonicalize(path) {
+        return resolved;
+    }
+    match (path.parent(), path.file_name()) {
+        (Some(parent), Some(name)) => resolve(parent).join(name),
+        // The path ends in `..`, and the folder above does not exist: drop its last part.
+        (Some(parent), None) => resolve(parent).parent().map(Path::to_owned).unwrap_or_default(),
+        (None, _) => path.to_owned(),
+    }
 }
 
 /// The number of numbers of a pose: the entries of a 3 by 4 matrix.

@@ -13,7 +13,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use mesh::{How, LoadedMesh};
 use runner::Run;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The common part of all answers.
 pub(crate) trait Answer {
@@ -127,12 +127,12 @@ impl<'a> Session<'a> {
         for mesh in std::iter::once(&self.a).chain(&self.b) {
             mesh.check()?;
         }
-        let AskingArguments { run: limits, out, bench, .. } = self.arguments;
+        let AskingArguments { run: limits, bench, .. } = self.arguments;
         for (stem, questions) in files {
             let run = Run::new(questions, &ask, self.backend, limits);
             let run = run.map_err(|error| mesh::blame(&self.a, self.b.as_ref(), error))?;
-            if let Some(out) = out {
-                run.write_raw(Path::new(&out.replacen("%s", stem, 1)))?;
+            if let Some(out) = self.arguments.raw_file(stem) {
+                run.write_raw(&out)?;
             }
             if *bench {
                 console::json(&self.bench(stem, &run))?;
@@ -238,6 +238,11 @@ impl AskingArguments {
             return Err(Failure::usage("--bench and --out require a file of queries"));
         }
         Ok(())
+    }
+
+    /// Returns the file for the raw results of a file of queries, if they are to be written.
+    fn raw_file(&self, stem: &str) -> Option<PathBuf> {
+        self.out.as_ref().map(|out| out.replacen("%s", stem, 1).into())
     }
 
     /// Returns how meshes are prepared.

@@ -27,9 +27,7 @@ pub(super) struct Journal {
 
 impl Journal {
     pub(super) fn open(path: &Path) -> Result<Self, Failure> {
-        let mut part = OsString::from(path);
-        part.push(".part");
-        let part = PathBuf::from(part);
+        let part = part(path);
         let failed = |error: io::Error| Failure::system(&part, format_args!("cannot create: {error}"));
         if path.is_dir() {
             let what = "cannot replace: expected a file or nothing, found a folder";
@@ -63,6 +61,13 @@ impl Journal {
         let _ = fs::remove_file(&self.part);
         Ok(())
     }
+}
+
+/// Returns the file beside an output manifest.
+pub(super) fn part(path: &Path) -> PathBuf {
+    let mut part = OsString::from(path);
+    part.push(".part");
+    part.into()
 }
 
 /// Opens a file to append to it, and locks it. Returns `None` if another process has locked it. Others may read it.

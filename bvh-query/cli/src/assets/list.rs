@@ -1,7 +1,8 @@
 //! Lists of assets: manifests, with one JSON object per line, and folders of meshes. Each asset is a mesh file with an output
 //! that no other asset has.
 
-use crate::asking::files::{each_json_line, files_below};
+use super::journal;
+use crate::asking::files::{each_json_line, files_below, place, refuse_overwriting};
 use crate::console::Failure;
 use crate::{bake, options};
 use bvh_bake::Options;
@@ -9,7 +10,6 @@ use bvh_bake::input::MeshFormat;
 use bvh_format::leaf::TriangleEncoding;
 use serde::Deserialize;
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// One of many bakes.
@@ -52,8 +52,6 @@ pub(super) fn require_memory(list: &Path, known: u64, max_memory: Option<u64>) -
 }
 
 /// Refuses two assets with the same output, and outputs that are an input, the manifest or the output manifest.
-///
-/// Paths are compared after the system has resolved their folders; folders that do not exist yet contain no links.
 pub(super) fn refuse_shared_outputs(
     assets: &[Asset],
     manifest: Option<&Path>,
@@ -91,31 +89,9 @@ pub(super) fn refuse_shared_outputs(
             return Err(Failure::invalid(&asset.input, what));
         }
     }
-    Ok(())
-}
-
-/// Returns the same path for a file however it is named, except through links to the file itself.
-fn place(path: &Path) -> PathBuf {
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let place = match (path.parent(), path.file_name()) {
-        (Some(folder), Some(name)) => resolve(folder).join(name),
-        _ => path,
-    };
-    // Windows ignores the case of letters in names.
-    if cfg!(windows) { place.to_string_lossy().to_lowercase().into() } else { place }
-}
-
-/// Returns a folder without links, `.` and `..`, whether it exists or not.
-fn resolve(folder: &Path) -> PathBuf {
-    if let Ok(resolved) = fs::canonicalize(folder) {
-        return resolved;
-    }
-    match (folder.parent(), folder.file_name()) {
-        (Some(parent), Some(name)) => resolve(parent).join(name),
-        // The path ends in `..`, and the folder above does not exist: drop its last part.
-        (Some(parent), None) => resolve(parent).parent().map(Path::to_owned).unwrap_or_default(),
-        (None, _) => folder.to_owned(),
-    }
+    let inputs = assets.iter().map(|asset| &*asset.input).chain(manifest);
+    let results = results.map(|path| [path.to_owned(), journal::part(path)]);
+    refuse_overwriting(results.iter().flatten(), inputs)
 }
 
 /// A line. The command line gives the defaults of its options.

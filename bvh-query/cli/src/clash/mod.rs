@@ -7,11 +7,11 @@ mod page;
 mod parts;
 mod zip;
 
-use crate::asking::{self, files::write_file};
+use crate::asking::{self, files::refuse_overwriting, files::write_file};
 use crate::console::{self, Failure, Record, counted, csv, record, shown, spinner};
 use crate::options::{Shard, not_negative, rounding, threads, whole};
 use crate::process;
-use crate::view::output::{self, PageArguments, refuse_input, refuse_standard_output};
+use crate::view::output::{self, PageArguments, refuse_standard_output};
 use baseline::{Baseline, Old};
 use bvh_bake::Rounding;
 use bvh_query::{Backend, ClashClass, ClashOptions, FileChange, Querier, QueryError, SceneError};
@@ -191,9 +191,9 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
     if let Some(view) = &arguments.view {
         refuse_standard_output("--view", view)?;
     }
-    let inputs = || arguments.files.iter().chain(&arguments.manifest).chain(&arguments.baseline);
+    let inputs = arguments.files.iter().chain(&arguments.manifest).chain(&arguments.baseline);
     let outputs = || arguments.view.iter().chain(&arguments.csv).chain(&arguments.bcf);
-    outputs().try_for_each(|output| refuse_input(output, inputs().map(PathBuf::as_path)))?;
+    refuse_overwriting(outputs(), inputs)?;
     let baseline = arguments.baseline.as_deref().map(Baseline::read).transpose()?;
     let spinner = spinner(false);
     process::remove_unfinished_files(&spinner)?;
@@ -202,7 +202,7 @@ fn run_with(arguments: &ClashArguments, backend: Backend, is_parallel: bool) -> 
     // Folders and manifests name further inputs.
     let mut files: Vec<&Path> = assembly.parts.iter().map(|part| &*part.file).collect();
     files.dedup();
-    outputs().try_for_each(|output| refuse_input(output, files.iter().copied()))?;
+    refuse_overwriting(outputs(), files)?;
     if arguments.view.is_some() {
         // Clashes do not count: a page that is too large is refused before parts are asked about.
         arguments.page.limit(page::page(&assembly, &[])?)?;

@@ -1,26 +1,27 @@
 //! The page of a robot: its links and obstacles, the lines of the file, and the answers about edges.
 
 use super::{Answer, Asked, Question, RobotArguments};
+use crate::asking::files::refuse_overwriting;
 use crate::console::{self, Failure, shown};
-use crate::view::output::{self, refuse_input, refuse_standard_output};
+use crate::view::output::{self, refuse_standard_output};
 use bvh_query::Pose;
 use cbvh_robot::Robot;
 use cbvh_view::{Page, RobotLine};
 use std::path::PathBuf;
 
-/// Refuses a page that would replace an input, and options without what they are about.
+/// Refuses outputs that would replace an input or each other, and options without what they are about.
 pub(super) fn check(arguments: &RobotArguments, obstacles: &[(PathBuf, Pose)]) -> Result<(), Failure> {
     let RobotArguments { urdf, srdf, file, edges, out, bench, run, .. } = arguments;
     if !arguments.asks() && (*edges || *bench || run.json || out.is_some()) {
         return Err(Failure::usage("--edges, --json, --bench and --out require FILE"));
     }
-    let Some(page) = &arguments.view else {
-        let is_in_vain = arguments.page.is_given();
-        return if is_in_vain { Err(Failure::usage("--max-page requires --view")) } else { Ok(()) };
-    };
-    refuse_standard_output("--view", page)?;
+    match &arguments.view {
+        Some(page) => refuse_standard_output("--view", page)?,
+        None if arguments.page.is_given() => return Err(Failure::usage("--max-page requires --view")),
+        None => {}
+    }
     let inputs = [urdf].into_iter().chain(srdf).chain(file).chain(obstacles.iter().map(|(path, _)| path));
-    refuse_input(page, inputs.map(PathBuf::as_path))
+    refuse_overwriting(arguments.view.iter().chain(out), inputs)
 }
 
 /// Refuses a page that is too large, before questions are asked.

@@ -3,6 +3,7 @@
 pub(crate) mod file;
 mod record;
 
+use crate::asking::files::refuse_overwriting;
 use crate::asking::runner::Run;
 use crate::asking::{self, RunArguments};
 use crate::console::{self, Failure};
@@ -105,6 +106,7 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
     let mode = arguments.mode;
     let within = asking::within(mode == Mode::Within, arguments.within)?;
     let question = Question { mode, within, all_distances: arguments.list.then_some(backend) };
+    refuse_overwriting(&arguments.out, [&arguments.scene].into_iter().chain(&arguments.frames))?;
     let is_baked = file::is_baked_scene(&arguments.scene)?;
     let (mut scene, mut frames) = if is_baked {
         let mut scene = file::open(&arguments.scene, backend)?;
@@ -115,6 +117,7 @@ pub(crate) fn run(arguments: &SceneArguments) -> Result<(), Failure> {
         (scene, frames)
     } else {
         let text = file::read(&arguments.scene)?;
+        refuse_overwriting(&arguments.out, text.files())?;
         let frames = file::read_frames(arguments.frames.as_deref(), &text.moving)?;
         (file::load(&arguments.scene, &text, &arguments.run.layout, backend)?, frames)
     };

@@ -5,7 +5,7 @@ mod browser;
 pub(crate) mod output;
 
 use crate::asking;
-use crate::asking::files;
+use crate::asking::files::{self, refuse_overwriting};
 use crate::asking::mesh::{self, How, LoadedMesh, is_baked, point_out_units};
 use crate::console::{self, Failure, counted, shown, spinner};
 use crate::options::{LayoutArguments, not_negative, positive};
@@ -14,7 +14,7 @@ use crate::scene::file::{self as scene, Frame, LoadedScene};
 use bvh_query::{InstanceId, OwnedShape, Pose, ReadAhead, RigidPath as _};
 use cbvh_view::{Frames, Named, Page};
 use clap::Args;
-use output::{PageArguments, refuse_input, refuse_standard_output};
+use output::{PageArguments, refuse_standard_output};
 use std::path::{Path, PathBuf};
 
 const HELP: &str = "\
@@ -84,8 +84,8 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), Failure> {
     let inputs: Vec<&Path> = arguments.files.iter().chain(&arguments.scene).map(PathBuf::as_path).collect();
     if let Some(output) = &arguments.output {
         refuse_standard_output("-o", output)?;
-        refuse_input(output, inputs.iter().copied())?;
     }
+    refuse_overwriting(&arguments.output, &inputs)?;
     let spinner = spinner(false);
     process::remove_unfinished_files(&spinner)?;
     spinner.set_message("reading");
@@ -170,9 +170,7 @@ fn scene_page(path: &Path, frames: Option<&Path>, arguments: &ViewArguments) -> 
         (loaded, read.transpose()?, None)
     } else {
         let text = scene::read(path)?;
-        if let Some(output) = &arguments.output {
-            refuse_input(output, text.files())?;
-        }
+        refuse_overwriting(&arguments.output, text.files())?;
         // Without frames, what may move stands where the file says.
         let read = frames.map(|frames| scene::read_frames(Some(frames), &text.moving)).transpose()?;
         (scene::load(path, &text, &arguments.layout, backend)?, read, Some(text))

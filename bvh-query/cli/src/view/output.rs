@@ -2,7 +2,7 @@
 
 use crate::console::Failure;
 use crate::options::size;
-use bvh_bake::{BakeError, write_atomically_with};
+use bvh_bake::write_atomically_with;
 use cbvh_view::{DEFAULT_MAX_BYTES, Page, PageError};
 use clap::Args;
 use std::path::Path;
@@ -60,20 +60,6 @@ pub(crate) fn refuse_standard_output(option: &str, output: &Path) -> Result<(), 
         "{option}: expected a file, found -; a page appears whole or not at all, so it cannot be standard output (write ./- for a \
          file of this name)"
     )))
-}
-
-/// Refuses an output that is an input, which it would replace.
-pub(crate) fn refuse_input<'a>(
-    output: &Path,
-    inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), Failure> {
-    let Ok(existing) = std::fs::canonicalize(output) else { return Ok(()) };
-    let is_output = |input| std::fs::canonicalize(input).is_ok_and(|input| input == existing);
-    if inputs.into_iter().any(is_output) {
-        let refused = BakeError::OutputIsInput { path: output.to_owned() };
-        return Err(Failure::from_bake(output.display(), &refused));
-    }
-    Ok(())
 }
 
 /// Returns the name of a file without its folders.

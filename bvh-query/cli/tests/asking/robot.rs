@@ -441,7 +441,10 @@ fn pages_that_cannot_be_written_are_named() {
     for input in ["two.urdf", "q.txt", "cube.obj", "two.srdf"] {
         let more = ["--srdf", "two.srdf", "--obstacle", AT_5, "--view", &format!("./{input}")];
         ask(&more).failed(1, &[input, "found an input"]);
+        let more = ["--srdf", "two.srdf", "--obstacle", AT_5, "--bench", "--out", input];
+        ask(&more).failed(1, &[input, "found an input"]);
     }
+    ask(&["--view", "page.html", "--out", "./page.html"]).failed(1, &["a different file for each output"]);
     ask(&["--max-page", "1MiB"]).failed(1, &["--max-page requires --view"]);
     let large = ask(&["--view", "page.html", "--max-page", "100"]);
     assert!(large.out.is_empty());

@@ -133,6 +133,56 @@ fn what_the_system_refuses_is_2() {
     assert!(names(&directory.join("folder")).is_empty());
 }
 
+#[test]
+fn no_output_replaces_an_input_or_another_output() {
+    let directory = &with_cube();
+    let pose = |x: i32| format!("1,0,0,{x},0,1,0,0,0,0,1,0");
+    let pose_line = format!("{}\n", pose(9).replace(',', " "));
+    let instance = pose_line.trim();
+    fs::create_dir(directory.join("dd")).unwrap();
+    directory.cbvh("bake cube.obj -o b.cbvh -q").done();
+    directory.write("p.txt", &pose_line);
+    directory.write("dd/p.txt", &pose_line);
+    directory.write("m.txt", format!("{} {}", pose_line.trim(), pose(0).replace(',', " ")));
+    directory.write("pts.txt", "0 0 5\n");
+    directory.write(
+        "s.scene",
+        format!("mesh m cube.obj\ninstance a m {instance}\ninstance b m {instance}\nmoving a\n"),
+    );
+    directory.write("in.part", "{\"input\": \"cube.obj\", \"output\": \"o.cbvh\"}\n");
+    let before = contents(directory);
+    let motion = format!("motion cube.obj b.cbvh --motion {},{} --witness", pose(9), pose(0));
+    for (command, inputs) in [
+        ("query cube.obj b.cbvh --mode distance --witness", &["cube.obj", "dd/../b.cbvh"][..]),
+        ("query b.cbvh cube.obj dd/p.txt,m.txt --bench --out", &["./%s.txt", "dd/%s.txt"]),
+        ("query b.cbvh cube.obj p.txt --bench --out", &["./p.txt", "cube.obj", "b.cbvh"]),
+        (&motion, &["cube.obj", "b.cbvh"]),
+        ("motion cube.obj b.cbvh m.txt --bench --out", &["m.txt", "cube.obj"]),
+        ("probe b.cbvh pts.txt --mode closest --bench --out", &["pts.txt", "b.cbvh"]),
+        ("scene s.scene p.txt --bench --out", &["s.scene", "p.txt", "dd/../cube.obj"]),
+        ("bake --manifest in.part --out-manifest", &["cube.obj", "in"]),
+    ] {
+        for input in inputs {
+            directory.cbvh(&format!("{command} {input}")).failed(1, &["found an input"]);
+        }
+    }
+    for (command, output) in [
+        ("clash cube.obj b.cbvh --csv x.csv --bcf dd/../x.csv", "x.csv"),
+        ("clash cube.obj b.cbvh --csv x.csv --view ./x.csv", "x.csv"),
+        ("query cube.obj b.cbvh p.txt,dd/p.txt --bench --out q_%s.txt", "q_p.txt"),
+    ] {
+        let words = [output, ": expected a different file for each output"];
+        directory.cbvh(command).failed(1, &words);
+    }
+    assert_eq!(contents(directory), before);
+}
+
+/// Returns the names and the contents of all files in a folder.
+fn contents(directory: &Path) -> Vec<(String, Option<Vec<u8>>)> {
+    let with_content = |name: String| (name.clone(), fs::read(directory.join(name)).ok());
+    names(directory).into_iter().map(with_content).collect()
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn devices_are_no_outputs() {

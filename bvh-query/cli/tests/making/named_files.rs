@@ -1,6 +1,7 @@
-//! Checks which files the command opens because a text or a folder names them, and that none of them makes it wait.
+//! Checks which files the command opens because a text or a folder names them, that none of them makes it wait, and which files
+//! outputs replace whose names are links.
 
-use crate::common::{Files as _, Place, cbvh_in, cube, gltf, place};
+use crate::common::{Files as _, Place, cbvh_in, cube, gltf, names, place};
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
@@ -14,6 +15,79 @@ fn with_pipes() -> Place {
         assert!(Command::new("mkfifo").arg(place.join(name)).status().unwrap().success());
     }
     place
+}
+
+/// Returns whether a name is that of a link.
+fn is_link(path: &Path) -> bool {
+    path.symlink_metadata().unwrap().is_symlink()
+}
+
+#[test]
+fn an_output_goes_where_its_links_lead() {
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    fs::create_dir(directory.join("far")).unwrap();
+    symlink("far/out.cbvh", directory.join("link")).unwrap();
+    symlink(directory.join("link"), directory.join("far/links")).unwrap();
+    directory.write("far/.out.cbvh.123-4.tmp", "left by a process that was killed");
+    let bake = "bake cube.obj -o far/links --json -q";
+    assert_eq!(directory.cbvh(bake).done().json()["skipped"], false);
+    assert_eq!(directory.cbvh(bake).done().json()["skipped"], true);
+    // The file is replaced, not written to: another name of the old one keeps its content.
+    directory.write("far/out.cbvh", "old");
+    fs::hard_link(directory.join("far/out.cbvh"), directory.join("old")).unwrap();
+    for more in ["", " --force --max-memory 512MiB"] {
+        directory.cbvh(&format!("{bake}{more}")).done();
+    }
+    directory.cbvh("validate far/out.cbvh").done();
+    assert_eq!(directory.text("old"), "old");
+    // Other outputs are written in the same way.
+    directory.cbvh("query cube.obj cube.obj --mode distance --witness link").done();
+    assert!(directory.text("far/out.cbvh").contains("v "));
+    assert!(is_link(&directory.join("link")) && is_link(&directory.join("far/links")));
+    assert_eq!(names(directory), ["cube.obj", "far", "link", "old"]);
+    assert_eq!(names(&directory.join("far")), ["links", "out.cbvh"]);
+}
+
+#[test]
+fn names_that_lead_to_one_file_are_one_output() {
+    let directory = &place();
+    directory.write("cube.obj", cube());
+    directory.write("p.txt", format!("{POSE}\n"));
+    symlink("p.txt", directory.join("poses")).unwrap();
+    symlink("new.csv", directory.join("link")).unwrap();
+    let asked = |poses: &str, out: &str| {
+        directory.cbvh(&format!("query cube.obj cube.obj {poses} --bench --out {out}"))
+    };
+    asked("p.txt", "poses").failed(1, &["poses: expected an output other than the inputs"]);
+    asked("poses", "p.txt").failed(1, &["p.txt: expected an output other than the inputs"]);
+    directory.cbvh("clash cube.obj cube.obj --csv link --bcf new.csv").failed(1, &["for each output"]);
+    let line = |output: &str| format!("{{\"input\": \"cube.obj\", \"output\": \"{output}\"}}\n");
+    directory.write("in.jsonl", line("link") + &line("new.csv"));
+    directory.cbvh("bake --manifest in.jsonl --out-manifest out").failed(3, &["an output of one asset only"]);
+    assert_eq!(names(directory), ["cube.obj", "in.jsonl", "link", "p.txt", "poses"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn links_into_the_system_are_no_outputs() {
+    let directory = &with_pipes();
+    // Standard output is a regular file here, which the links must not make an output.
+    symlink("/proc/self/fd/1", directory.join("out")).unwrap();
+    symlink("/proc/self/fd", directory.join("fd")).unwrap();
+    symlink("out", directory.join("again")).unwrap();
+    symlink("/dev/none.cbvh", directory.join("none")).unwrap();
+    symlink("pipe", directory.join("piped")).unwrap();
+    symlink("cycle", directory.join("cycle")).unwrap();
+    let before = names(directory);
+    for output in ["out", "fd/1", "again", "none", "piped", "cycle"] {
+        let words = [output, "expected a regular file or none, found a special file"];
+        directory.cbvh(&format!("bake cube.obj -o {output}")).failed(2, &words);
+        let query = "query cube.obj cube.obj --mode distance --witness";
+        directory.cbvh(&format!("{query} {output}")).failed(2, &words);
+    }
+    assert!(["out", "again", "none", "piped"].iter().all(|link| is_link(&directory.join(link))));
+    assert_eq!(names(directory), before);
 }
 
 const POSE: &str = "1 0 0 0 0 1 0 0 0 0 1 0";

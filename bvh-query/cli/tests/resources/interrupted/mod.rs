@@ -6,11 +6,12 @@
 mod disks;
 
 use crate::common::sheet::write_sheet;
-use crate::common::{cbvh_in, names, place};
+use crate::common::{cbvh_in, names, place, skip};
 use cbvh_testkit::Random;
 use cbvh_testkit::depth::rounds;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
+use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -152,7 +153,46 @@ fn a_bake_that_is_killed_leaves_nothing_for_good() {
 #[cfg(unix)]
 #[test]
 fn a_bake_that_is_told_to_end_leaves_nothing() {
-    end_with(&["-TERM", "-INT"], 2, true);
+    end_with(&["-TERM", "-INT", "-HUP"], 2, true);
+}
+
+/// Sends a hangup to a bake that waits for a pipe. If the bake is to ignore it, the pipe then gets a mesh.
+#[cfg(unix)]
+fn hang_up(is_ignored: bool) -> (std::process::ExitStatus, String) {
+    let directory = &place();
+    assert!(Command::new("mkfifo").arg(directory.join("pipe.stl")).status().unwrap().success());
+    let trap = if is_ignored { "trap '' HUP;" } else { "" };
+    let bake = Command::new("sh")
+        .args(["-c", &format!("{trap} exec \"$0\" bake pipe.stl -o out.cbvh -q"), env!("CARGO_BIN_EXE_cbvh")])
+        .current_dir(directory)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // This waits until the bake opens the pipe, long after it has begun to wait for signals.
+    let mut pipe = File::options().write(true).open(directory.join("pipe.stl")).unwrap();
+    assert!(Command::new("kill").args(["-HUP", &bake.id().to_string()]).status().unwrap().success());
+    if is_ignored {
+        write_sheet(&directory.join("small.stl"), 2);
+        pipe.write_all(&fs::read(directory.join("small.stl")).unwrap()).unwrap();
+        drop(pipe);
+    }
+    let ended = bake.wait_with_output().unwrap();
+    (ended.status, String::from_utf8(ended.stderr).unwrap())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_hangup_ends_a_bake_unless_it_is_ignored() {
+    use std::os::unix::process::ExitStatusExt as _;
+    let (ended, said) = hang_up(true);
+    assert!(ended.success() && said.is_empty(), "{ended} {said}");
+    if Command::new("sh").args(["-c", "kill -HUP $$"]).status().unwrap().success() {
+        skip("the tests themselves ignore hangups");
+        return;
+    }
+    let (ended, said) = hang_up(false);
+    assert_eq!(said, "cbvh: stopped by SIGHUP; no unfinished file was left behind\n");
+    assert_eq!(ended.signal(), Some(1));
 }
 
 /// A process that is killed at the worst moment may leave a scratch file. The next bake removes it, even if that bake
