@@ -154,6 +154,8 @@ impl<'a> FileBake<'a> {
             return Err(InputError::Empty.into());
         }
         refuse_output(&self.inputs, &self.output)?;
+        // Everything else is beside the file that is replaced, whichever link leads there.
+        self.output = atomic::target(&self.output)?;
         let may_be_up_to_date = !self.force && self.output.exists();
         let readings = if may_be_up_to_date { 2 } else { 1 };
         self.progress.expect(Step::Read, file_lengths(&self.inputs).saturating_mul(readings));

@@ -131,8 +131,7 @@ fn kept(path: &Path) -> impl Fn(io::Error) -> BakeError {
 /// Removes what killed processes left in the directory of an output: the temporary files for that output, and scratch
 /// files.
 pub(crate) fn remove_stale_beside(output: &Path) {
-    let Ok(output) = target(output) else { return };
-    remove_stale(directory_of(&output), &[output.file_name().unwrap_or_default(), SCRATCH_NAME.as_ref()]);
+    remove_stale(directory_of(output), &[output.file_name().unwrap_or_default(), SCRATCH_NAME.as_ref()]);
 }
 
 /// Removes the temporary files for any of the given names that killed processes left in a directory.

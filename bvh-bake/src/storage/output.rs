@@ -9,7 +9,7 @@
 
 use crate::error::BakeError;
 use crate::progress::{Progress, Stage, Step};
-use crate::storage::atomic::{Temporary, failed, target};
+use crate::storage::atomic::{Temporary, failed};
 use crate::storage::{read_exact_at, write_all_at};
 use bvh_format::source::Source;
 use std::borrow::Cow;
@@ -50,11 +50,9 @@ impl Output {
         Self::Memory { bytes: Vec::new(), progress: progress.clone() }
     }
 
-    /// Creates a file beside `path` whose bytes are read back from the system. Bytes written and read are counted. If `path` is a
-    /// link, the file is beside that to which the link leads, and replaces that one.
+    /// Creates a file beside `path` whose bytes are read back from the system. Bytes written and read are counted.
     pub(crate) fn beside(path: &Path, progress: &Progress) -> Result<Self, BakeError> {
-        let (path, progress) = (target(path)?, progress.clone());
-        let file = Temporary::beside(&path)?;
+        let (file, path, progress) = (Temporary::beside(path)?, path.to_owned(), progress.clone());
         Ok(Self::File(OutputFile { writer: None, file, path, length: 0, progress, kept: None }))
     }
 

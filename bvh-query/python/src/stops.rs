@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 /// How long questions may run before Python handles signals.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
 
-/// How far apart looks at the time should be, and how many reads of a flag there may be between two of them. The next look is
-/// planned by how long reads have taken: from the time of a short question to milliseconds.
+/// How long it should be from one look at the time to the next. How many reads of a flag that takes is known from those so far.
 const LOOK: Duration = Duration::from_millis(2);
+/// The reads before the first look, so that a short question does without one, and the most between two looks.
 const FIRST_READS: u32 = 8;
 const MOST_READS: u32 = 64;
 

@@ -859,6 +859,8 @@ export const cases = {
         structuredClone(moved.buffer, { transfer: [moved.buffer] });
         const wrong = [
             [() => cube.collide(cube, [1, 2, 3]), "pose: expected 12 numbers, found 3"],
+            [() => cbvh.capsule(1, -1), "length: expected a finite length of at least 0, found -1"],
+            [() => cbvh.capsule(1, NaN), "length: expected a finite length of at least 0, found NaN"],
             [
                 () => cube.collideEach(cube, new Float64Array(13)),
                 "poses: expected 12 numbers for each, found 13 numbers in all",

@@ -23,6 +23,9 @@ export function sphere(radius: number): Mesh {
 /** Makes a capsule: a segment along z with a radius, its middle at the origin. */
 export function capsule(radius: number, length: number): Mesh {
     const half = float(length, "length") / 2;
+    if (!(half >= 0 && half < Number.POSITIVE_INFINITY)) {
+        throw new RangeError(`length: expected a finite length of at least 0, found ${length}`);
+    }
     return rounded(Mesh.bake([0, 0, -half, 0, 0, half], [0, 1, 1]), radius);
 }
 

@@ -61,11 +61,11 @@ impl Querier {
     /// Returns how far B moves along a direction, given in A's frame at any length, until interiors are disjoint. A mesh inside
     /// another one moves until it is out.
     ///
-    /// Interiors are what [`Querier::side`] calls inside. `upper` is certain because exact arithmetic finds the shapes apart at
-    /// the pose with that translation added. `lower` is certain because stretches during which two triangles cross, or a ball
-    /// inside A and one inside B have a common point, follow each other without a gap. Both agree to some roundings, unless
-    /// surfaces only slide along each other on a part of the way: `lower` ends there. A surface that encloses no volume counts
-    /// as if it did. All numbers have the same bits on all backends.
+    /// Interiors are what [`Querier::side`] calls inside. `upper` is certain because exact arithmetic finds the shapes apart
+    /// at the pose with that translation added. `lower` is certain because stretches during which two triangles cross, or a
+    /// ball inside A and one inside B have a common point, follow each other without a gap. Both agree to some roundings,
+    /// unless surfaces only slide along each other on a part of the way, or a tiny ball does: `lower` ends there. A surface
+    /// that encloses no volume counts as if it did. All numbers have the same bits on all backends.
     ///
     /// Cost: some walks, each like one for contact, and as many as triangles follow each other on the way.
     ///
